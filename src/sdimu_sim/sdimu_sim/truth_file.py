@@ -5,58 +5,16 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import yaml
-from pydantic import Field
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.files.config import Schema, read_yaml
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_sim.core.true_coefficients import true_coefficients
-from sdimu_sim.core.truth import ImuTruth, Truth
+from sdimu_sim.core.truth import Truth
 
 _FORMAT = "sdimu-truth/1"
-_Vector = tuple[float, float, float]
-
-
-class _SiteFile(Schema):
-    latitude_deg: float
-    height_m: float
-    gravity_m_s2: float | None = None
-
-
-class _NoiseFile(Schema):
-    gyro_rad_s_sqrt_hz: float = Field(ge=0)
-    accel_m_s2_sqrt_hz: float = Field(ge=0)
-    coloured: tuple[str, ...] = ()
-
-
-class _ElectronicsFile(Schema):
-    gyro_step_rad: float = 0.0
-    accel_step_m_s: float = 0.0
-    gyro_limit_rad_s: float | None = None
-    accel_limit_m_s2: float | None = None
-
-
-class _TruthFile(Schema):
-    format: Literal["sdimu-truth/1"]
-    plan: str
-    rate_hz: float
-    seed: int
-    site: _SiteFile
-    coefficients: dict[str, float]
-    coefficients_accelerometer_triad: dict[str, float]
-    as_built: dict[str, float]
-    mount_rad: _Vector
-    noise: _NoiseFile
-    effects: tuple[str, ...] = ()
-    mean_bias: dict[str, float] = Field(default_factory=dict)
-    reference_degc: float | None = None
-    lever_arm_m: _Vector = (0.0, 0.0, 0.0)
-    magnetic_field_t: _Vector
-    electronics: _ElectronicsFile = _ElectronicsFile()
 
 
 def write_truth(path: Path, truth: Truth) -> None:
@@ -140,30 +98,6 @@ def _is_truth(path: Path) -> bool:
             return file.readline(100).strip() == f"format: {_FORMAT}".encode()
     except OSError:
         return False
-
-
-def read_truth(path: Path) -> Truth:
-    """Read the truth of a test; the same file gives the same recording again."""
-    if not path.is_file():
-        raise DataError(f"{path}: no such truth file")
-    file = read_yaml(path, _TruthFile)
-    limits = file.electronics
-    imu = ImuTruth(
-        coefficients=file.as_built,
-        mount_rad=file.mount_rad,
-        gyro_white_noise=file.noise.gyro_rad_s_sqrt_hz,
-        accel_white_noise=file.noise.accel_m_s2_sqrt_hz,
-        effects=file.effects,
-        noise=file.noise.coloured,
-        lever_arm_m=file.lever_arm_m,
-        magnetic_field=file.magnetic_field_t,
-        gyro_step_rad=limits.gyro_step_rad,
-        accel_step_m_s=limits.accel_step_m_s,
-        gyro_limit_rad_s=math.inf if limits.gyro_limit_rad_s is None else limits.gyro_limit_rad_s,
-        accel_limit_m_s2=math.inf if limits.accel_limit_m_s2 is None else limits.accel_limit_m_s2,
-    )
-    site = Site(math.radians(file.site.latitude_deg), file.site.height_m, file.site.gravity_m_s2)
-    return Truth(imu, site, file.seed, file.rate_hz, file.plan, file.mean_bias, file.reference_degc)
 
 
 class _Exact(yaml.SafeDumper):

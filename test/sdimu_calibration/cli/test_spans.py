@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sdimu_calibration.cli.spans import read_rests, read_spans
+from sdimu_calibration.cli.options import read_rests, read_spans
 from sdimu_calibration.core.recording import DataError
 
 SPANS = ((1.5, 4.0), (6.0, 9.25))

@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 import typer
+from truth_reader import read_truth
 from typer.testing import CliRunner
 
 from sdimu_calibration.core.recording import DataError
@@ -14,7 +15,6 @@ from sdimu_calibration.storage.files.config import load_imu, load_plan, load_sit
 from sdimu_sim.cli.options import mount_rad
 from sdimu_sim.cli.simulate import simulate
 from sdimu_sim.core import Scenario, generate
-from sdimu_sim.truth_file import read_truth
 
 PLAN = """
 dwell: 5 s

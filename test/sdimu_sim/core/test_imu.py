@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_sim.core.imu import Electronics, response
+from sdimu_sim.core.generator import Electronics, response
 from sdimu_sim.core.samples import TrueSamples
 from sdimu_sim.core.truth import COEFFICIENTS, ImuTruth
 

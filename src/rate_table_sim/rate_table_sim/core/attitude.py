@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core.gimbal import gimbal_axes, gimbal_motion, quaternion_product, turn_quaternion
 from rate_table_sim.core.specification import Imperfections, TableSpecification
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table.gimbals import unit
-
-Floats = NDArray[np.float64]
 
 
 class Attitude(Protocol):

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core.specification import Imperfections
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.rotation import cross, rotation_matrix
 from sdimu_calibration.core.table.gimbals import unit
-
-Floats = NDArray[np.float64]
 
 
 def gimbal_axes(axes: tuple[str, str, str], errors: Imperfections) -> Floats:

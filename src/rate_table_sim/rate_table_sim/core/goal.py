@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 
 from rate_table_sim.core.profile import trapezoid
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.plan import Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table.description import AxisLimits
-
-Floats = NDArray[np.float64]
 
 LONGEST_S = 6.0 * 3600.0
 """Longest goal (s): its samples are made at once, and six hours of them are 250 MB at 100 Hz."""

@@ -7,16 +7,14 @@ from fractions import Fraction
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core.attitude import attitude_of, first_orientation
 from rate_table_sim.core.profile import trapezoid
 from rate_table_sim.core.specification import AXES, Imperfections, TableSpecification
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table.gimbals import assign_turns
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -45,8 +43,8 @@ class TableMotion:
     angle: Floats
     rate: Floats
     encoder_angle: Floats
-    stop: NDArray[np.int64]
-    dwell: NDArray[np.bool_]
+    stop: Ints
+    dwell: Bools
     q_nt: Floats
     omega_nt_t: Floats
     names: tuple[str, str, str]
@@ -79,7 +77,7 @@ def table_motion(plan: Plan, table: TableSpecification, seed: int = 0) -> TableM
     )
 
 
-def phase_changes(motion: TableMotion) -> tuple[Floats, NDArray[np.bool_], NDArray[np.int64]]:
+def phase_changes(motion: TableMotion) -> tuple[Floats, Bools, Ints]:
     """Report phase and stop at every change and once a second.
 
     Returns
@@ -91,7 +89,7 @@ def phase_changes(motion: TableMotion) -> tuple[Floats, NDArray[np.bool_], NDArr
     return motion.t[at], motion.dwell[at], motion.stop[at]
 
 
-def reported_samples(motion: TableMotion, before: TableMotion | None = None) -> NDArray[np.int64]:
+def reported_samples(motion: TableMotion, before: TableMotion | None = None) -> Ints:
     """Find the samples at which phase and stop are reported: at every change and once a second.
 
     Parameters
@@ -120,7 +118,7 @@ def grid_times(first: int, stop: int, rate_hz: float) -> Floats:
 
 def _axis_motion(
     plan: Plan, sample_rate_hz: float, columns: tuple[tuple[int, float], ...]
-) -> tuple[Floats, Floats, NDArray[np.int64], NDArray[np.bool_]]:
+) -> tuple[Floats, Floats, Ints, Bools]:
     """Angle and rate (n, 3), stop and dwell (n,)."""
     profiles = [
         trapezoid(turn, plan.acceleration_rad_s2, sample_rate_hz, k) for k, turn in enumerate(plan.turns, start=1)

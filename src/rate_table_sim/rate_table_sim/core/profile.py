@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.plan import Turn
 from sdimu_calibration.core.recording import DataError
-
-Floats = NDArray[np.float64]
 
 _ON_GRID = 1e-6
 """A time this close to a sample (in samples) is on it: decimal fractions are not exact in binary."""

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rate_table_sim.core.attitude import attitude_of, first_orientation
 from rate_table_sim.core.goal import AxisState, Goal, GoalPoint, braking_point, goal_samples
 from rate_table_sim.core.motion import Encoder, TableMotion, grid_times
 from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 
-Floats = NDArray[np.float64]
 _ROUNDING = 1e-6
 """A time this close to a sample (in samples) is on it (1)."""
 

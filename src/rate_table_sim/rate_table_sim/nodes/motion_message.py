@@ -9,10 +9,9 @@ from __future__ import annotations
 from array import array
 
 import numpy as np
-from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
-Floats = NDArray[np.float64]
+from sdimu_calibration.core.arrays import Floats
 
 _COLUMNS = "t,qw,qx,qy,qz,wx,wy,wz"
 

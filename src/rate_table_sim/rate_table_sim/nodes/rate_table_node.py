@@ -22,7 +22,6 @@ from rate_table_sim.core import TableMotion, reported_samples, table_motion
 from rate_table_sim.core.programme import GoalProgramme, PlanProgramme, Programme
 from rate_table_sim.nodes.goal_server import GoalServer
 from rate_table_sim.nodes.motion_message import encode_motion
-from rate_table_sim.nodes.pace import Pace
 from rate_table_sim.nodes.table_frames import TableFrames
 from rate_table_sim.table_file import load_table
 from sdimu_calibration.nodes.credits import HISTORY, NS, Producer, header
@@ -37,6 +36,38 @@ REAL_TIME_BLOCK_S = 0.02
 WINDOW_S = 2.0
 PEERS_PATIENCE_S = 5.0
 FAREWELL_S = 20.0
+
+
+class Pace:
+    """Times real time, counted from the first question after a restart.
+
+    Parameters
+    ----------
+    speed : float
+        Times real time; 0 sets no pace.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._origin: tuple[float, float] | None = None
+
+    @property
+    def runs(self) -> bool:
+        """Whether there is a pace."""
+        return self._speed > 0.0
+
+    def restart(self) -> None:
+        """Count anew: time stood still, or ran at another pace."""
+        self._origin = None
+
+    def allows(self, until_s: float) -> bool:
+        """Whether simulated time may have reached `until_s` (s) now."""
+        if not self.runs:
+            return True
+        if self._origin is None:
+            self._origin = (time.monotonic(), until_s)
+        began, from_s = self._origin
+        return until_s - from_s <= self._speed * (time.monotonic() - began)
 
 
 class RateTableNode:

@@ -4,20 +4,53 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdimu_calibration.api.coefficient import Coefficient
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis, nis_judged, noise_learned
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si, parse_unit
 from sdimu_calibration.extras import needed
-from sdimu_calibration.report.table import as_text, cells, headings, rich_table, rows
+from sdimu_calibration.report.table import as_text, cells, headings, rich_table, rows, with_sigma
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient.
+
+    Attributes
+    ----------
+    value, sigma : float
+        SI.
+    unit, display_unit : str
+        SI unit, and the customary one.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+    display_unit: str
+
+    def to(self, unit: str) -> tuple[float, float]:
+        """Value and sigma in another unit, such as ``deg/h``."""
+        if parse_unit(unit).dimension != parse_unit(self.unit).dimension:
+            raise DataError(f"{self.name}: '{unit}' is of another kind than '{self.display_unit}'")
+        return from_si(self.value, unit), from_si(self.sigma, unit)
+
+    def __repr__(self) -> str:
+        """Name, value and sigma in the customary unit."""
+        value, sigma = self.to(self.display_unit)
+        return f"{self.name} = {with_sigma(value, sigma, self.display_unit)}"
+
 
 _WIDTH = 110
 """Columns of the table that stands for a fit."""

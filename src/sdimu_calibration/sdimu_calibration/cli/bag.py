@@ -11,6 +11,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.options import BagArgument, JsonOption
+from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.plain_text import one_line
 
 app = typer.Typer(
@@ -21,7 +22,6 @@ app = typer.Typer(
 @app.command()
 def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     """Show topics, types and counts."""
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.storage.bags.bag_info import read_info
 
     content = read_info(bag)

@@ -15,8 +15,11 @@ from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
+from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.set_run import SetRequest, calibrate_together, refuse_for_sets, single
 from sdimu_calibration.core.note import MISFITS, topic_of
+from sdimu_calibration.core.units import STANDARD_GRAVITY
+from sdimu_calibration.storage.files.whole_file import written_together
 
 
 @dataclass(frozen=True)
@@ -32,16 +35,13 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
 
     Exit status 3: done, but the estimate is not to be trusted; stderr says why.
     """
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.estimation.outcome import outcome
     from sdimu_calibration.core.estimation.solve import AUTO, solve
     from sdimu_calibration.core.site_reference import relative_line
-    from sdimu_calibration.core.units import STANDARD_GRAVITY
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.files.reference_file import read_truth
     from sdimu_calibration.storage.files.result_file import write_result
-    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.trace import traced
 
     console, truth = plain(stderr=request.as_json), request.truth

@@ -9,6 +9,8 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.options import JsonOption
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.results import Calibration
@@ -19,8 +21,6 @@ def compare(
     as_json: JsonOption = False,
 ) -> None:
     """Show how far the error fell with each model; folders of one recording, simplest model first."""
-    from sdimu_calibration.cli.wide_table import print_table
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.comparison import comparison, headings, remarks
     from sdimu_calibration.storage.files.result_file import read_result
 

@@ -12,6 +12,8 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagArgument, OwnEffectOption, ReplaceOption, checked_degc
+from sdimu_calibration.cli.progress import bar
+from sdimu_calibration.core.units import from_si
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,7 @@ def compensate(
 
     A result that is not to be trusted is applied all the same; stderr says why it is not.
     """
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.compensation import compensator
-    from sdimu_calibration.core.units import from_si
     from sdimu_calibration.storage.bags.bag_reader import read_recording
     from sdimu_calibration.storage.bags.compensated_bag import write_compensated
     from sdimu_calibration.storage.bags.compensated_imu import frame_of

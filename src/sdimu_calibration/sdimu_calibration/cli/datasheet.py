@@ -12,6 +12,9 @@ import sdimu_calibration
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import FoldersArgument, JsonOption, results_in
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,14 +53,12 @@ def datasheet(
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
     from datetime import UTC, datetime
 
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.fleet import datasheet as core
     from sdimu_calibration.report.fleet.sheet import HEADINGS, rows, write_page
     from sdimu_calibration.storage.files.datasheet_file import Certificate, hashed, write_datasheet
     from sdimu_calibration.storage.files.fleet_folder import gather
     from sdimu_calibration.storage.files.limits_file import read_limits
     from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
-    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     allowed = {} if limits is None else read_limits(limits, core.known_terms())
@@ -97,8 +98,6 @@ def _noise_below(folders: Sequence[Path]) -> list[Path]:
 
 def _of_unit(entries: tuple[Entry, ...], serial: str | None, certificate: bool) -> tuple[Entry, ...]:
     """Take the results of one unit, where one is named or a certificate needs one."""
-    from sdimu_calibration.core.recording import DataError
-
     units = list(dict.fromkeys(entry.unit for entry in entries))
     if serial is not None and serial not in units:
         raise DataError(f"--serial {serial}: no result of it (there are: {', '.join(units)})")

@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
+from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, single
+from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
     from sdimu_calibration.cli.next_commands import Asked
@@ -51,13 +55,10 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     Exit status 3: done, but the estimate is not to be trusted; stderr says why.
     """
     from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
-    from sdimu_calibration.cli.next_commands import Asked
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.effect_file import find_effects
     from sdimu_calibration.storage.files.model_choice import HANDHELD
     from sdimu_calibration.storage.trace import traced
@@ -101,13 +102,11 @@ def _write(
     about: Asked, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
 ) -> None:
     """Leave diagnosis.json, result.json and report.html."""
-    from sdimu_calibration.cli.next_commands import PLAN, as_plan, spelled
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.files.plan_file import write_plan
     from sdimu_calibration.storage.files.result_file import write_result
-    from sdimu_calibration.storage.files.whole_file import written_together
 
     found = summary.diagnosis
     with written_together(about.folder) as part:

@@ -9,6 +9,7 @@ from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.verdict import beyond
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
 
@@ -55,7 +56,6 @@ def notes_of_diagnosis(d: Diagnosis) -> tuple[str, ...]:
     What stands among the findings is not said twice.
     """
     from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
-    from sdimu_calibration.core.note import without_advice
 
     if d.fit.learns_scatter:
         return without_advice(d.after.notes)

@@ -67,21 +67,16 @@ def _content(name: str | None) -> dict[str, Any]:
     """Give the catalogue, or one effect of it, as plain data (SI)."""
     from sdimu_calibration.report.catalogue import grouped
     from sdimu_calibration.storage.files.effect_file import find_effects
+    from sdimu_calibration.storage.files.json_file import entry
 
     chosen = find_effects(name) if name else [effect for _, found in grouped() for effect in found]
     listed = [
-        {
-            "name": effect.name,
-            "title": effect.title,
-            "equation": effect.equation,
-            "description": effect.description,
-            "typical": effect.typical,
-            "scope": effect.scope,
-            "prior": dict(effect.prior),
-            "coefficients": [
-                {"name": p.name, "unit": p.unit, "display_unit": p.display_unit} for p in effect.parameters
-            ],
-        }
+        entry(
+            effect,
+            "name title equation description typical scope",
+            prior=dict(effect.prior),
+            coefficients=[entry(p, "name unit display_unit") for p in effect.parameters],
+        )
         for effect in chosen
     ]
     return {"format": "sdimu-catalogue/1", "effects": listed}

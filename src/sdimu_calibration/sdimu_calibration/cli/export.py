@@ -11,6 +11,7 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.options import OwnEffectOption, checked_degc
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import same_file
 
 _MOST_HZ = 1e6
 """Highest sample rate (Hz): no IMU sends faster."""
@@ -40,7 +41,6 @@ def export(
     from sdimu_calibration.storage.export import export as write
     from sdimu_calibration.storage.files.effect_file import effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
-    from sdimu_calibration.storage.files.whole_file import same_file
 
     if not 0.0 < rate <= _MOST_HZ:
         raise DataError(f"--rate {rate:g}: expected a sample rate above 0 to {_MOST_HZ:g} Hz")

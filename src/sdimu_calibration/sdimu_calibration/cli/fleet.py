@@ -9,6 +9,8 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.options import FoldersArgument, JsonOption, results_in
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.storage.files.whole_file import written_together
 
 
 def fleet(
@@ -23,13 +25,11 @@ def fleet(
     as_json: JsonOption = False,
 ) -> None:
     """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.fleet.study import study
     from sdimu_calibration.report.fleet import tables
     from sdimu_calibration.report.fleet.page import display_units, headline, write_page
     from sdimu_calibration.storage.files.fleet_file import write_fleet, write_priors
     from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
-    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     gathered = gather(folders)

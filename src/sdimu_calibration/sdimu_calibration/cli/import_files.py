@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import command, plain, say
+from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,7 +44,6 @@ def import_files(
     """Turn files of others into a recording, as a map of their columns says (doc/recordings.md)."""
     from contextlib import nullcontext
 
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.importing.import_map import load_import_map
     from sdimu_calibration.storage.importing.importer import read_files, write_imported
 
@@ -103,8 +104,6 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
     """Write maps that probably fit, and say how to go on."""
     import shlex
 
-    from sdimu_calibration.core.recording import DataError
-    from sdimu_calibration.storage.files.whole_file import write_whole
     from sdimu_calibration.storage.importing.map_proposal import propose_maps
 
     folder = Path() if out is None else out.parent

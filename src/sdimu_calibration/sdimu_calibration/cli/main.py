@@ -29,37 +29,24 @@ from sdimu_calibration.extras import lacking
 ENTRY_POINTS = "sdimu_calibration.verbs"
 
 _PANELS = {
-    "Simulate and record": {
-        "simulate": "",
-        "run": "",
-        "import": "sdimu_calibration.cli.import_files:import_files",
-        "bag": "sdimu_calibration.cli.bag:app",
-        "set": "sdimu_calibration.cli.set_files:app",
-    },
-    "Calibrate": {
-        "calibrate": "sdimu_calibration.cli.calibrate:calibrate",
-        "noise": "sdimu_calibration.cli.noise:noise",
-        "replay": "sdimu_calibration.cli.replay:replay",
-        "watch": "sdimu_calibration.cli.watch_verb:watch",
-    },
-    "Diagnose": {
-        "diagnose": "sdimu_calibration.cli.diagnose:diagnose",
-        "compare": "sdimu_calibration.cli.compare:compare",
-        "effects": "sdimu_calibration.cli.effects:effects",
-        "workbench": "sdimu_calibration.cli.workbench:workbench",
-        "pictures": "sdimu_calibration.cli.pictures:pictures",
-    },
-    "Plan": {"predict": "sdimu_calibration.cli.predict:predict", "plan": "sdimu_calibration.cli.plan:plan"},
-    "Use": {
-        "compensate": "sdimu_calibration.cli.compensate:compensate",
-        "export": "sdimu_calibration.cli.export:export",
-        "datasheet": "sdimu_calibration.cli.datasheet:datasheet",
-        "fleet": "sdimu_calibration.cli.fleet:fleet",
-    },
-    "Study": {"monte-carlo": "", "hidden-campaign": "", "study": "", "bench": ""},
+    "Simulate and record": "simulate run import bag set",
+    "Calibrate": "calibrate noise replay watch",
+    "Diagnose": "diagnose compare effects workbench pictures",
+    "Plan": "predict plan",
+    "Use": "compensate export datasheet fleet",
+    "Study": "monte-carlo hidden-campaign study bench",
 }
-"""Verbs in the order of work, as ``module:attribute``; empty: of another package, which may not be installed."""
-_VERBS = {name: place for verbs in _PANELS.values() for name, place in verbs.items() if place}
+"""Verbs in the order of work."""
+_ELSEWHERE = "simulate run monte-carlo hidden-campaign study bench"
+"""Those of other packages, which may not be installed."""
+_PLACES = {"import": "import_files:import_files", "bag": "bag:app", "set": "set_files:app", "watch": "watch_verb:watch"}
+"""Where a verb is, as ``module:attribute``; the others are a function in a module of their name."""
+_PLACED = [name for verbs in _PANELS.values() for name in verbs.split()]
+_VERBS = {
+    name: f"sdimu_calibration.cli.{_PLACES.get(name, f'{name}:{name}')}"
+    for name in _PLACED
+    if name not in _ELSEWHERE.split()
+}
 _MORE = "More"
 """Where verbs of other packages stand that have no place above."""
 
@@ -70,8 +57,7 @@ class Verbs(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 (the signature is the base class')
         """Names of the verbs in the order of work, then what other packages add."""
         there = {**_VERBS, **_added()}
-        placed = [name for verbs in _PANELS.values() for name in verbs if name in there]
-        return [*placed, *(name for name in there if name not in placed)]
+        return [*(name for name in _PLACED if name in there), *(name for name in there if name not in _PLACED)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""
@@ -182,7 +168,7 @@ def _command(name: str, verb: Any) -> Any:
         verb = single
     command: Any = get_command(verb)
     command.name = name
-    command.rich_help_panel = next((panel for panel, verbs in _PANELS.items() if name in verbs), _MORE)
+    command.rich_help_panel = next((panel for panel, verbs in _PANELS.items() if name in verbs.split()), _MORE)
     return command
 
 

@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.opened import default_folder
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagArgument, JsonOption, Recorded, results_in
+from sdimu_calibration.cli.progress import bar
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,15 +36,12 @@ def noise(
     as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
-    from sdimu_calibration.cli.opened import default_folder
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.noise import rests, white_noise
     from sdimu_calibration.report.noise import HEAD, misfits, write_page
     from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.files.config import find_config, load_site
     from sdimu_calibration.storage.files.imu_file import write_measured_imu
     from sdimu_calibration.storage.files.noise_terms_file import write_noise_terms
-    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.opening import open_recording
 
     # Errors in files are reported before the work.
@@ -84,7 +86,6 @@ def _terms(
     """Allan deviation and noise terms of each channel."""
     import numpy as np
 
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.noise import allan, fit_terms
     from sdimu_calibration.report.noise import CHANNELS
 
@@ -113,7 +114,6 @@ def gravity_note(recording: Recording, rows: Sequence[slice], site: Site) -> str
     import numpy as np
 
     from sdimu_calibration.core import earth
-    from sdimu_calibration.core.units import from_si
 
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     size = float(np.mean([np.linalg.norm(recording.f_ib_b[r].mean(axis=0)) for r in rows]))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from sdimu_calibration.cli.console import say
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,7 +37,6 @@ def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted)
         As it was asked for, ``auto`` included.
     """
     from sdimu_calibration.core.estimation.solve import AUTO
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.effect_file import find_effects
     from sdimu_calibration.storage.files.model_choice import HANDHELD, named_model
 
@@ -99,8 +99,6 @@ def _reasons(result: Calibration, diagnosed: tuple[Verdict, str] | None) -> list
 @contextmanager
 def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
     """Print the notes of a recording when an estimate refuses it: they may say why."""
-    from sdimu_calibration.core.recording import DataError
-
     try:
         yield
     except DataError:

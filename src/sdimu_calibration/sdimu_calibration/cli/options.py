@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,13 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer.models import OptionInfo
 
-from sdimu_calibration.cli.spans import read_rests, read_spans
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.core.effect_key import read_quantity
 from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.specification import ImuSpecification
-    from sdimu_calibration.storage.opening import Opening, Source
 
 _OF_SETS = "Several recordings of one unit"
 _MOST_DEGC = 1e4
@@ -169,8 +166,6 @@ class Stated(Place):
     @property
     def whole_turns_rad(self) -> float:
         """How well turns by hand are whole (rad); 0 where nobody says it."""
-        from sdimu_calibration.core.effect_key import read_quantity
-
         if self.whole_turns is None:
             return 0.0
         whole = read_quantity("--whole-turns", self.whole_turns, "deg")
@@ -181,8 +176,6 @@ class Stated(Place):
     @property
     def reference_degc(self) -> float | None:
         """Temperature from which effects count (deg C); None is that at the start."""
-        from sdimu_calibration.core.effect_key import read_quantity
-
         if self.reference_temperature is None:
             return None
         return checked_degc(
@@ -297,3 +290,56 @@ def read_stops(text: str) -> tuple[int, ...]:
     if not all(word.isdecimal() for word in words):
         raise DataError(f"--exclude-stops {text}: expected numbers of stops such as 4,7")
     return tuple(sorted({int(word) for word in words}))
+
+
+Spans = tuple[tuple[float, float], ...]
+_SPAN = re.compile(r"\s*(\d+(?:\.\d+)?)\s*-\s*(\d+(?:\.\d+)?)\s*")
+_PAIR = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*[,;-]\s*|\s+)(\d+(?:\.\d+)?)\s*[,;]?\s*")
+
+
+def read_spans(text: str, option: str = "--exclude-times") -> Spans:
+    """Read spans of time (s), such as ``812-815,900-910``, in ascending order."""
+    found = [_SPAN.fullmatch(word) for word in text.split(",")]
+    if not all(found):
+        raise DataError(f"{option} {text}: expected spans of seconds such as 812-815,900-910")
+    return _ascending([(float(match[1]), float(match[2])) for match in found if match], f"{option} {text}")
+
+
+def read_rests(text: str) -> Spans:
+    """Read the rests of a run by hand (s): spans, or the path of a file with begin and end of one on each line."""
+    if _SPAN.fullmatch(text.split(",", maxsplit=1)[0]):
+        return read_spans(text, "--rests")
+    path = Path(text)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(
+            f"--rests {text}: expected spans of seconds such as 10-13,15.5-18, or a text file with begin and end of a "
+            "rest on each line"
+        ) from error
+    spans: list[tuple[float, float]] = []
+    for number, line in enumerate(lines, start=1):
+        words = line.partition("#")[0]
+        if not words.strip():
+            continue
+        match = _PAIR.fullmatch(words)
+        if match is None:
+            if not spans and not any(c.isdigit() for c in words):
+                continue
+            raise DataError(f"{path}: line {number}: '{line.strip()}': expected begin and end of a rest (s)")
+        spans.append((float(match[1]), float(match[2])))
+    if not spans:
+        raise DataError(f"{path}: no rest in it: expected begin and end of one (s) on each line")
+    return _ascending(spans, str(path))
+
+
+def _ascending(spans: list[tuple[float, float]], where: str) -> Spans:
+    for begin, end in spans:
+        if end <= begin:
+            raise DataError(f"{where}: the span {begin:g}-{end:g} ends before it begins")
+    return tuple(sorted(spans))
+
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.specification import ImuSpecification
+    from sdimu_calibration.storage.opening import Opening, Source

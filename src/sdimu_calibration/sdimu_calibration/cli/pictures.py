@@ -8,7 +8,9 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.opened import default_folder
 from sdimu_calibration.cli.options import BagArgument, ImuNameOption, results_in
+from sdimu_calibration.cli.progress import bar
 
 
 def pictures(
@@ -19,8 +21,6 @@ def pictures(
     out: Annotated[Path | None, results_in("pictures; BAG_pictures")] = None,
 ) -> None:
     """Draw a diagnosis as PNG files: heat map before and after, candidates, ladder, drift in use."""
-    from sdimu_calibration.cli.opened import default_folder
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.report.pictures import write_pictures

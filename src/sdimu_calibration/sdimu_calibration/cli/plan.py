@@ -14,6 +14,11 @@ import typer
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import JsonOption, ModelOption
+from sdimu_calibration.cli.progress import bar
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.core.effect_key import read_quantity
+from sdimu_calibration.core.units import from_si
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,8 +73,6 @@ class Allowed:
     @property
     def acceleration_rad_s2(self) -> float:
         """Acceleration in SI."""
-        from sdimu_calibration.core.recording import DataError
-
         if not 0.0 < self.acceleration <= _MOST_ACCELERATION:
             raise DataError(f"--acceleration {self.acceleration:g}: expected above 0 to {_MOST_ACCELERATION:g} deg/s^2")
         return math.radians(self.acceleration)
@@ -122,7 +125,6 @@ def plan(
     request: PlanRequest,
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
-    from sdimu_calibration.cli.plan_after import After, standing_of
     from sdimu_calibration.core.plan_search import Question
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.model_choice import named_model
@@ -161,7 +163,6 @@ class _Begun:
 
 def _tell(console: Console, asked: _Begun, coefficients: Sequence[str], allowed: Allowed, as_json: bool) -> None:
     """Rank extra turns that tell coefficients apart."""
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.plan_search import next_turn, untold
 
     # The next recording is one of its own: the shortest that tells these apart.
@@ -177,9 +178,6 @@ def _tell(console: Console, asked: _Begun, coefficients: Sequence[str], allowed:
 
 def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequest) -> None:
     """Search a plan, show what it brings and write it where it is better."""
-    from sdimu_calibration.cli.plan_after import tell_gain
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.plan_search import Goal, search
     from sdimu_calibration.core.plan_search.bound import already, bounds
     from sdimu_calibration.storage.files.plan_file import write_plan
@@ -227,8 +225,6 @@ def _table(
     start: Plan, known: Bounds | None, first: Bounds, found: Found, limits: Mapping[str, float]
 ) -> tuple[list[str], list[list[str]]]:
     """Headings, and the largest sigma of each effect: what is known (where something is), with both plans, allowed."""
-    from sdimu_calibration.core.units import from_si
-
     columns = {"known": known, start.name: first, "found": found.bounds}
     shown = {name: b.largest() for name, b in columns.items() if b is not None}
     units = dict(zip(first.effect, first.units, strict=True))
@@ -266,9 +262,7 @@ def _ranking(start: Plan, tell: Sequence[str], ranked: Sequence[NextTurn]) -> di
 
 def _limits(texts: Sequence[str]) -> dict[str, float]:
     """Read ``EFFECT=SIGMA`` into SI."""
-    from sdimu_calibration.core.effect_key import read_quantity
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.core.recording import DataError
 
     out = {}
     for text in texts:
@@ -284,8 +278,6 @@ def _limits(texts: Sequence[str]) -> dict[str, float]:
 
 def _numbers(option: str, text: str, most: float) -> list[float]:
     """Read numbers with commas between them, all above zero and none above `most`."""
-    from sdimu_calibration.core.recording import DataError
-
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
@@ -293,3 +285,92 @@ def _numbers(option: str, text: str, most: float) -> list[float]:
     if not values or not all(0.0 < v <= most for v in values):
         raise DataError(f"{option} '{text}': expected numbers above zero to {most:g}, such as '2,10'")
     return values
+
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.core.evidence.known import Standing
+    from sdimu_calibration.core.plan import Plan
+    from sdimu_calibration.core.plan_search import Bounds, Found
+
+
+@dataclass(frozen=True)
+class After:
+    """What stands in the options of `sdimu plan`; entries as the options of the same names."""
+
+    paths: Sequence[Path]
+    imu: str | None
+    site: str | None
+    model: str
+
+
+def standing_of(console: Console, asked: After) -> Standing:
+    """Read what results know; recordings are diagnosed first, several as one set."""
+    from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing, standing_of_result
+
+    results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
+    if results and len(asked.paths) > 1:
+        raise DataError(
+            f"--after {results[0]}: results stand alone, as two of them may count a recording twice; name the bags, "
+            "which are then diagnosed together"
+        )
+    if results:
+        return read_standing(results[0]) if holds_standing(results[0]) else standing_of_result(results[0], asked.imu)
+    return _diagnosed(console, asked)
+
+
+def _diagnosed(console: Console, asked: After) -> Standing:
+    from sdimu_calibration.cli.options import FitRequest, StatedOpening
+    from sdimu_calibration.cli.set_run import SetRequest, diagnosed_set
+    from sdimu_calibration.core.diagnosis.diagnose import climb
+    from sdimu_calibration.core.diagnosis.standing import standing
+    from sdimu_calibration.core.diagnosis.summary import summarise
+    from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.model_choice import named_model
+    from sdimu_calibration.storage.opening import open_test
+
+    if len(asked.paths) > 1:
+        request = SetRequest(asked.paths, StatedOpening(asked.site, asked.imu), FitRequest(asked.model))
+        found = diagnosed_set(console, request, ())[0]
+        say(console, f"{found.verdict}: {found.sentence}")
+        return found.standing
+    test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
+    with bar(console) as progress:
+        one = summarise(climb(solve(test, named_model(asked.model, ()), progress=progress), progress=progress))
+    say(console, f"{one.diagnosis.verdict}: {one.diagnosis.sentence}")
+    return standing(one.diagnosis, one.found)
+
+
+def tell_gain(
+    console: Console, start: Plan, found: Found, classes: Sequence[Sequence[str]], sigmas: tuple[Bounds, Bounds, Bounds]
+) -> None:
+    """Say what the plan tells beyond what is known, beside the plan that the search began with.
+
+    Parameters
+    ----------
+    classes : sequence of sequence of str
+        What is open, by coefficients.
+    sigmas : tuple of Bounds
+        Known, with the start, with the plan that was found.
+    """
+    from sdimu_calibration.core.effects.selection import resolve
+    from sdimu_calibration.core.plan_search import gain
+    from sdimu_calibration.core.plan_search.next_turn import apart, in_sigmas
+
+    known, first, last = sigmas
+    tells = [gain(known.covariance, b.covariance) for b in (first, last)]
+    say(
+        console,
+        f"beyond what is known {start.name} tells {tells[0]:.1f} nat in {start.duration_s / 60.0:.1f} min, the plan "
+        f"found {tells[1]:.1f} nat in {found.minutes:.1f} min ({found.tried} plans tried)",
+    )
+    for labels in classes:
+        names = [p.name for label in labels for p in resolve(label).parameters]
+        sizes = in_sigmas(*(apart(b, names, None) for b in sigmas))
+        say(
+            console,
+            f"{labels[0]} from {', '.join(labels[1:])}, each as large as its prior: apart by {sizes[0]} sigma now, "
+            f"{sizes[1]} after {start.name}, {sizes[2]} after the plan found",
+        )

@@ -11,7 +11,9 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.options import ImuNameOption, JsonOption, ModelOption
+from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.plan import Plan
@@ -34,14 +36,12 @@ def predict(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""
-    from sdimu_calibration.cli.wide_table import print_table
     from sdimu_calibration.core.batch.batch import bound_covariance
     from sdimu_calibration.core.planning.predict import predict as simulate
     from sdimu_calibration.report.prediction import COLUMNS, coefficient_rows, write_page
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.files.noise_file import load_noise
     from sdimu_calibration.storage.files.prediction_file import write_prediction
-    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=as_json)
     what = load_plan(plan), load_site(site), load_imu(imu), load_model(model)

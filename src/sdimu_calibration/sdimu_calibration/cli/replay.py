@@ -12,6 +12,7 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import default_folder, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagArgument, DomainOption, EachStopOption, ModelOption, Recorded, results_in
+from sdimu_calibration.core.data_error import DataError
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,6 @@ def _play(log: Path, calibrating: dict[str, Any], player: dict[str, Any], patien
     import time
 
     from sdimu_calibration.cli.processes import Children, own_domain
-    from sdimu_calibration.core.recording import DataError
 
     begun = time.monotonic()
     with own_domain(log, domain) as used, Children(log) as children:

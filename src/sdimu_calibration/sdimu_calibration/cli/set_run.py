@@ -16,6 +16,9 @@ from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
 from sdimu_calibration.cli.opened import leave, tell
 from sdimu_calibration.cli.options import FitRequest, Place, StatedOpening
+from sdimu_calibration.cli.progress import bar
+from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -88,7 +91,6 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.core.joint.set_fit import fit_set
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.result_file import write_result
-    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.set_work import judged_outcome
 
     console = plain(stderr=asked.request.as_json)
@@ -110,7 +112,6 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
     from sdimu_calibration.storage.files.result_file import write_result
-    from sdimu_calibration.storage.files.whole_file import written_together
 
     console = plain(stderr=asked.request.as_json)
     found, members = diagnosed_set(console, asked, extra)
@@ -151,7 +152,6 @@ def diagnosed_set(
 @contextmanager
 def _begun(console: Console, asked: SetRequest) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
-    from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 
@@ -226,7 +226,6 @@ def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
 
 def _show(console: Console, result: Calibration, diagnosed: bool = False) -> None:
     """Print the table, the power-ons and what the user should know."""
-    from sdimu_calibration.core.note import without_advice
     from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.report.table import rich_table, rows
 

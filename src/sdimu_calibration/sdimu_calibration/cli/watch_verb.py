@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from sdimu_calibration.core.data_error import DataError
+
 
 def watch(
     model: Annotated[str, typer.Option(help="Model that the node estimates: names the effects and their units.")] = (
@@ -21,7 +23,6 @@ def watch(
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.watch import Outline, Watch
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.effect_file import extended_model
 
     chosen = extended_model(model, ())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,10 +12,17 @@ import typer
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.option_groups import with_options, words_of
 from sdimu_calibration.cli.options import BagsArgument, Recorded, SetOption
+from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.set_run import single
+from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
+    from sdimu_calibration.core.progress import Progress
+    from sdimu_calibration.core.specification import Model
+
+    Judge = Callable[[Sequence[str], Progress], SetDiagnosis]
 
 HOST = "127.0.0.1"
 
@@ -36,14 +44,10 @@ def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -
     """Open recordings in the browser; runs until it is stopped with Ctrl-C."""
     import logging
     import socket
-    from collections.abc import Callable, Mapping
     from functools import partial
 
     from werkzeug.serving import make_server
 
-    from sdimu_calibration.cli.progress import bar
-    from sdimu_calibration.cli.set_bench import bench_of_set
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.report.workbench.app import build
     from sdimu_calibration.report.workbench.fit import FitSession
     from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
@@ -90,11 +94,49 @@ def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -
 
 def navigated(name: str, test: PreparedTest) -> PreparedTest:
     """Return a test that is navigated."""
-    from sdimu_calibration.core.recording import DataError
-
     if test.why_handheld:
         raise DataError(
             f"{name}: a handheld run, in which nothing is navigated ({test.why_handheld}): use sdimu diagnose "
             f"{name} (its report has the same figures)"
         )
     return test
+
+
+def bench_of_set(
+    bags: Sequence[Path], file: Path | None, model: str | None, opening: Recorded
+) -> tuple[Mapping[str, Callable[[], PreparedTest]], Model, Judge]:
+    """Read a set for the workbench: each of its recordings by itself, and what judges them together.
+
+    Parameters
+    ----------
+    file : Path or None
+        Set file, in the place of bags.
+    model : str or None
+        As the option of the same name.
+
+    Returns
+    -------
+    openers : mapping of str to callable
+        What opens each recording, by its name.
+    model : Model
+        To start from.
+    judge : callable
+        Diagnoses the set with effects added; it gets their names and a progress function.
+    """
+    from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+    from sdimu_calibration.core.joint.set_fit import SetOptions
+    from sdimu_calibration.storage.files.model_choice import named_model
+    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of
+    from sdimu_calibration.storage.set_work import set_runner
+
+    like = BagSource(Path(), opening.site, opening.imu, opening.source)
+    wanted = set_of(bags, like) if file is None else load_set(file, like)
+    named = model or wanted.model
+
+    def judge(added: Sequence[str], progress: Progress) -> SetDiagnosis:
+        options = SetOptions(named_model(named, added), wanted.estimator, scopes=wanted.scopes)
+        # In this process: the recordings of a person at a page are few, and the cores are those of the page, too.
+        with set_runner(len(wanted.members), 1, None) as run:
+            return diagnose_set(wanted.members, options, run, (), progress)
+
+    return {member.name: member.open for member in wanted.members}, named_model(named, []), judge

@@ -10,6 +10,9 @@ from statistics import NormalDist
 
 from sdimu_calibration.core.arrays import Floats
 
+GAUSS_MAD = 1.482602218505602
+"""Ratio of sigma to median absolute deviation (1): that of a Gaussian, 1 over the normal quantile of 3/4."""
+
 
 def in_percent(p: float) -> str:
     """Write a probability for people: ``87 %``; beyond what two digits can say ``< 1 %`` and ``> 99 %``."""

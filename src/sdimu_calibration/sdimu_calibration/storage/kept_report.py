@@ -10,25 +10,21 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
 import zipfile
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.estimation.fit import Start
-from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.member import Report
-from sdimu_calibration.core.joint.reduction import Reduction
-from sdimu_calibration.core.joint.stretch_rows import Places
-from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_calibration.storage.files.whole_file import beside
 
-REPORT_FORMAT = "sdimu-reduction/3"
+REPORT_FORMAT = "sdimu-reduction/4"
 """What a recording says: a line, then an NPZ file of plain arrays; no code is loaded from it."""
 SUFFIX = ".reduction"
 LONGEST = 1 << 28
@@ -45,49 +41,10 @@ def write_report(path: Path, report: Report, number: str) -> None:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    found, start = report.reduction, report.start
-    words = {
-        "format": REPORT_FORMAT,
-        "name": report.name,
-        "estimator": report.estimator,
-        "reason": report.reason,
-        "names": found.names,
-        "labels": found.labels,
-        "rows": found.rows,
-        "unexplained": found.unexplained,
-        "imu": vars(report.imu) | {"prior": dict(report.imu.prior), "prior_units": dict(report.imu.prior_units)},
-        "start_names": start.names,
-        "start_ns": report.start_ns,
-        "temperature_degc": report.temperature_degc,
-        "duration": report.times.duration,
-        "stops": report.times.stops,
-        "turns": report.times.turns,
-        "data": dict(report.data),
-        "statistics": report.statistics.entries(),
-        "reported": report.names,
-        "notes": report.notes,
-        "warnings": report.warnings,
-        "heading_rad": report.heading_rad,
-        "noise": [vars(term) for term in report.noise],
-        "widened": report.widened,
-        "site": None if report.site is None else vars(report.site),
-    }
-    places = {} if report.places is None else {f"dwell_{key}": value for key, value in vars(report.places).items()}
+    arrays: dict[str, NDArray[Any]] = {}
+    words = json.dumps({"format": REPORT_FORMAT, "report": _plain(report, arrays)}).encode()
     content = io.BytesIO()
-    np.savez(
-        content,
-        words=np.frombuffer(json.dumps(words).encode(), dtype=np.uint8),
-        A=found.A,
-        y=found.y,
-        point=found.point,
-        weight=found.weight,
-        start=start.coefficients,
-        C_nb=start.C_nb,
-        more=start.more,
-        values=report.values,
-        sigma=report.sigma,
-        **places,
-    )
+    np.savez(content, words=np.frombuffer(words, dtype=np.uint8), **arrays)  # type: ignore[arg-type]
     part = beside(path)
     try:
         part.write_bytes(_first_line(number, content.getvalue()) + content.getvalue())
@@ -131,63 +88,39 @@ def _unpacked(content: bytes) -> Report | None:
 def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
     if words["format"] != REPORT_FORMAT:
         return None
-    reduction = Reduction(
-        tuple(words["names"]),
-        tuple(words["labels"]),
-        arrays["A"],
-        arrays["y"],
-        arrays["point"],
-        arrays["weight"],
-        int(words["rows"]),
-        float(words["unexplained"]),
-    )
-    if reduction.A.shape != (len(reduction.y), len(reduction.names) + len(reduction.labels)):
+    report: Report = _built(Report, words["report"], arrays)
+    found = report.reduction
+    if found.A.shape != (len(found.y), len(found.names) + len(found.labels)):
         return None
-    start = Start(tuple(words["start_names"]), arrays["start"], arrays["C_nb"], arrays["more"])
-    times = Timetable(words["duration"], _spans(words["stops"]), _spans(words["turns"]))
-    heat = words["temperature_degc"]
-    return Report(
-        words["name"],
-        "",
-        "",
-        reduction,
-        words["estimator"],
-        words["reason"],
-        ImuSpecification(**words["imu"]),
-        start,
-        int(words["start_ns"]),
-        times,
-        math.nan if heat is None else float(heat),
-        words["data"],
-        FitStatistics(**words["statistics"]),
-        tuple(words["reported"]),
-        arrays["values"],
-        arrays["sigma"],
-        tuple(words["notes"]),
-        tuple(map(as_note, words["warnings"])),
-        float(words["heading_rad"]),
-        tuple(_term(entry) for entry in words["noise"]),
-        bool(words["widened"]),
-        _places(arrays),
-        _site(words["site"]),
-    )
+    return replace(report, warnings=tuple(map(as_note, report.warnings)))
 
 
-def _places(arrays: dict[str, Any]) -> Places | None:
-    own = {key.removeprefix("dwell_"): value for key, value in arrays.items() if key.startswith("dwell_")}
-    return Places(**own) if own else None
+def _plain(value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Give a dataclass, and what is in it, as plain data; an array goes to `arrays`, its key is left in its place."""
+    if is_dataclass(value):
+        return {each.name: _plain(getattr(value, each.name), arrays) for each in fields(value)}
+    if isinstance(value, np.ndarray):
+        key = f"array_{len(arrays)}"
+        arrays[key] = value
+        return key
+    if isinstance(value, Mapping):
+        return {key: _plain(entry, arrays) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(entry, arrays) for entry in value]
+    return value
 
 
-def _site(entry: dict[str, Any] | None) -> Site | None:
-    if entry is None:
-        return None
-    field = entry["magnetic_field_t"]
-    return Site(**(entry | {"magnetic_field_t": None if field is None else tuple(field)}))
-
-
-def _term(entry: dict[str, Any]) -> NoiseTerm:
-    return NoiseTerm(**(entry | {"alike": tuple(entry["alike"])}))
-
-
-def _spans(rows: list[list[float]]) -> tuple[tuple[int, float, float], ...]:
-    return tuple((int(k), float(a), float(b)) for k, a, b in rows)
+def _built(hint: Any, value: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Build what `_plain` gave, of the type `hint`."""
+    if isinstance(hint, UnionType) or get_origin(hint) is Union:
+        return None if value is None else _built(get_args(hint)[0], value, arrays)
+    if is_dataclass(hint):
+        hints = get_type_hints(hint)
+        return hint(**{name: _built(hints[name], entry, arrays) for name, entry in value.items()})  # type: ignore[operator]
+    if get_origin(hint) is np.ndarray:
+        return arrays[value]
+    if get_origin(hint) is tuple:
+        kind, *others = get_args(hint)
+        kinds = [kind] * len(value) if others == [...] else [kind, *others]
+        return tuple(_built(each, entry, arrays) for each, entry in zip(kinds, value, strict=True))
+    return value

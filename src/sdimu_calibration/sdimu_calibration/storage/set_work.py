@@ -38,8 +38,6 @@ FEW = 3
 """Number of recordings up to which one process is faster: starting another takes as long as two recordings."""
 _PART = 16
 """Number of recordings after which reports are written: what a kill may cost."""
-_BLOCK = 1 << 20
-"""Bytes that are read at a time for a checksum."""
 _SOURCES = Path(__file__).resolve().parents[1]
 """Folder of the package."""
 
@@ -228,6 +226,5 @@ def _checksum(files: tuple[FileState, ...]) -> str:
         total.update(f"{len(path.name.encode(errors='surrogateescape'))} {size} ".encode())
         total.update(path.name.encode(errors="surrogateescape"))
         with path.open("rb") as file:
-            while block := file.read(_BLOCK):
-                total.update(block)
+            hashlib.file_digest(file, lambda: total)
     return total.hexdigest()

@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, print_advice, spelled
 from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
+from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.storage.files.whole_file import same_file, written_together
 from sdimu_sim.cli.options import SeedOption, World
 
 if TYPE_CHECKING:
@@ -141,8 +144,6 @@ def _leave(result: Calibration, goals: str | None, end: dict[str, Any] | None) -
 
 def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
     """Refuse options that would have no effect."""
-    from sdimu_calibration.core.recording import DataError
-
     if ask and adaptive is None:
         raise DataError("--ask: a plan asks nothing; it needs --adaptive GOALS")
     if plan is not None and adaptive is not None:
@@ -154,8 +155,6 @@ def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
 
     The file of the plan that is to be followed stays.
     """
-    from sdimu_calibration.cli.next_commands import PLAN
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
 
@@ -174,7 +173,6 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     """Read everything once, so that a wrong option is one line before anything starts; length of the test (s)."""
     from rate_table_sim.core import table_motion
     from rate_table_sim.table_file import load_table
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_sim.cli.options import mount_rad
@@ -235,7 +233,6 @@ def _watch(console: Console, children: Children, test: Outline) -> float:
     import time
 
     from sdimu_calibration.cli.watch import Watch
-    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.nodes.monitor import Monitor
 
     monitor = Monitor()
@@ -279,7 +276,6 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
 def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
     from sdimu_calibration.cli.diagnosis_text import print_out_of_sight
-    from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
@@ -291,7 +287,6 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
-    from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.trace import traced
 
@@ -333,7 +328,6 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
     part : Path
         Where files are written that then go to `out` together.
     """
-    from sdimu_calibration.cli.next_commands import PLAN, as_plan
     from sdimu_calibration.storage.files.config import load_plan
     from sdimu_calibration.storage.files.plan_file import write_plan
 
@@ -348,8 +342,6 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
 
 def _is_file(name: str, file: Path) -> bool:
     """Tell whether a plan is named by the path of a file."""
-    from sdimu_calibration.storage.files.whole_file import same_file
-
     return same_file(Path(name), file)
 
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sdimu_calibration.cli.options import read_stops
-from sdimu_calibration.cli.spans import read_spans
+from sdimu_calibration.cli.options import read_spans, read_stops
 from sdimu_calibration.core.alignment.prepared import PreparedData, set_up
 from sdimu_calibration.core.alignment.without import without
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest

@@ -14,7 +14,7 @@ from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError, TemperatureLog
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
-from sdimu_sim.core.imu import response
+from sdimu_sim.core.generator import response
 from sdimu_sim.core.samples import TrueSamples
 from sdimu_sim.core.truth import ImuTruth
 

@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.fleet.common import adjusted, common_effects, given
 from sdimu_calibration.core.fleet.population import FALSE_ALARM, Measured, measured, population
 from sdimu_calibration.core.fleet.priors import population_priors
-from sdimu_calibration.core.fleet.trends import AGE, PRODUCTION, YEAR_S, trends
+from sdimu_calibration.core.fleet.study import AGE, PRODUCTION, YEAR_S, trends
 from sdimu_calibration.core.recording import DataError
 
 NAMES = tuple("abcdef")

@@ -14,6 +14,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.blocks import pieces
+from sdimu_calibration.core.probability import GAUSS_MAD
 from sdimu_calibration.core.recording import NOMINAL_FROM, ClockStep, nominal_interval_ns
 
 _LEAST = 0.05
@@ -35,8 +36,6 @@ _MANY = 300
 
 _ENOUGH = 100_000
 """Number of distances of which a median is taken at most: more decide nothing that these do not."""
-_GAUSS_MAD = 1.482602218505602
-"""Ratio of sigma to median absolute deviation: that of a Gaussian."""
 
 
 class Step(NamedTuple):
@@ -62,7 +61,7 @@ def find_steps(ns: Ints, omega: Floats, force: Floats) -> tuple[Step, ...]:
     places = _uneven(ns, interval)
     if not len(places):
         return ()
-    scatter = _GAUSS_MAD * float(np.median(np.abs(np.diff(ns) - interval)))
+    scatter = GAUSS_MAD * float(np.median(np.abs(np.diff(ns) - interval)))
     places = places[np.abs(ns[places] - ns[places - 1] - interval) > _CLEAR * scatter]
     if not len(places) or len(places) > _MANY:
         return ()

@@ -19,6 +19,7 @@ from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.effects.scale import ACCEL_SCALE
 from sdimu_calibration.core.navigation.strapdown import CYCLE_S
+from sdimu_calibration.core.probability import GAUSS_MAD
 from sdimu_calibration.core.recording import DataFault, PhaseLog
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -203,7 +204,7 @@ def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, g
         return phases
     pairs = dwell[1:] & dwell[:-1]
     steps = np.abs(np.diff(epochs.w_mean, axis=0)[pairs])
-    measured = _GAUSS_MAD / np.sqrt(2.0) * float(np.median(steps)) if len(steps) else 0.0
+    measured = GAUSS_MAD / np.sqrt(2.0) * float(np.median(steps)) if len(steps) else 0.0
     limit = _EARLY_SIGMAS * max(gyro_white_noise / np.sqrt(EPOCH_S), measured)
     moving = np.concatenate([[-1], np.flatnonzero(~dwell)])
     for end in ends:
@@ -218,8 +219,6 @@ def without_early_motion(epochs: Epochs, log: PhaseLog | None, phases: Phases, g
     return replace(phases, dwell=dwell, used=phases.used & dwell, first=phases.first & dwell)
 
 
-_GAUSS_MAD = 1.482602218505602
-"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 _EARLY_SIGMAS = 5.0
 """Deviation from the mean rate of its dwell (sigma): beyond it the last second before a turn belongs to the turn."""
 

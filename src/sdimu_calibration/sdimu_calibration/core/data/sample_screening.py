@@ -18,6 +18,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.plain_text import counted
+from sdimu_calibration.core.probability import GAUSS_MAD
 from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -57,8 +58,6 @@ _TURN_BEGINS = 10.0
 """Ratio of a change of rate to the usual one from which it may be a turn: noise reaches 7."""
 _TOGETHER = 2_000_000
 """Number of samples to which channels are looked at side by side: longer recordings lie in a file, not in memory."""
-_GAUSS_MAD = 1.482602218505602
-"""Ratio of sigma to median absolute deviation: that of a Gaussian."""
 
 
 def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
@@ -251,7 +250,7 @@ def _spikes(x: Floats) -> Ints:
     for _round in range(_ROUNDS):
         left = x if rows is None else x[rows]
         size = _bends(left)
-        sigma = _GAUSS_MAD * float(np.median(size))
+        sigma = GAUSS_MAD * float(np.median(size))
         at = np.union1d(_stand_out(left, size, sigma, 1), _stand_out(left, size, sigma, 2))
         if not len(at):
             break

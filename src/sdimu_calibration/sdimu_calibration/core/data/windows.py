@@ -15,6 +15,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.matrix3 import multiplied, rotation3, store
+from sdimu_calibration.core.probability import GAUSS_MAD
 
 WINDOW_S = 1.0
 """Usual length (s): a hand turns by tens of degrees in it, and its tremor (10 Hz) averages out of a quarter of it."""
@@ -30,8 +31,6 @@ _TURNING_EARTH = 3.0
 unbalance."""
 _MOVING = np.radians(1.0)
 """Largest scatter of a resting gyro (rad/s): what scatters more moves, and an IMU that always moves has no rests."""
-_MAD = 1.482602218505602
-"""Factor from the median of |x| to the standard deviation: of Gaussian noise."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +112,8 @@ class Windows:
         if not quiet.any():
             return np.zeros(len(self), dtype=bool)
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
-        noise = _MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
-        usual = _MAD * float(np.median(self.swing[quiet]))
+        noise = GAUSS_MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
+        usual = GAUSS_MAD * float(np.median(self.swing[quiet]))
         limit = np.minimum(_TURNING_EARTH * earth.RATE + _REST * noise, _MOVING)
         still = (np.abs(self.w_mean - np.median(self.w_mean[quiet], axis=0)) < limit).all(axis=1)
         earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE

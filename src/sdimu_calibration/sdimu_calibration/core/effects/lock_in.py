@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import GYRO, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import GYRO, per_axis_columns
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.effects.registry import register_family
 from sdimu_calibration.core.units import to_si
 
 _FLOOR = to_si(2.0, "deg/h")
@@ -24,20 +24,18 @@ def _pull(motion: Motion) -> Floats:
     return np.asarray(-0.5 * motion.w / (motion.w**2 + _FLOOR**2))
 
 
-LOCK_IN = register(
-    family(
-        "gyro_lock_in",
-        "gyro lock-in (ring laser)",
-        "dw_i = sqrt(w_i^2 - L_i^2) sgn(w_i) - w_i, about -k_i w_i/(2 (w_i^2 + s^2)), k = L^2, s = 2 deg/h",
-        per_axis_columns(GYRO, _pull),
-        ("rad^2/s^2", "deg^2/h^2"),
-        (1, 2, 10),
-        positive=True,
-        typical="RLG with dither L = 0.05-1 deg/h, others none",
-        description="The rate is short by L^2/(2 w), L the lock-in rate that is left with dither: strongest at stops "
-        "where an axis sees a small part of Earth rate, nothing in turns. The linear form holds to some per cent while "
-        "L is below 1 deg/h; a larger L comes out too large. Where every stop is cardinal it is "
-        "one class with a dead band; stops between the axes tell them apart.",
-        confused_with=("gyro_dead_band", "gyro_magnetic"),
-    )
+LOCK_IN = register_family(
+    "gyro_lock_in",
+    "gyro lock-in (ring laser)",
+    "dw_i = sqrt(w_i^2 - L_i^2) sgn(w_i) - w_i, about -k_i w_i/(2 (w_i^2 + s^2)), k = L^2, s = 2 deg/h",
+    per_axis_columns(GYRO, _pull),
+    ("rad^2/s^2", "deg^2/h^2"),
+    (1, 2, 10),
+    positive=True,
+    typical="RLG with dither L = 0.05-1 deg/h, others none",
+    description="The rate is short by L^2/(2 w), L the lock-in rate that is left with dither: strongest at stops "
+    "where an axis sees a small part of Earth rate, nothing in turns. The linear form holds to some per cent while "
+    "L is below 1 deg/h; a larger L comes out too large. Where every stop is cardinal it is "
+    "one class with a dead band; stops between the axes tell them apart.",
+    confused_with=("gyro_dead_band", "gyro_magnetic"),
 )

@@ -51,9 +51,8 @@ GRAVITY = register(
         needs_table=True,
         never_seen="a wrong gravity is a common scale factor of the accelerometers whatever the plan: survey it",
         typical="WGS-84 normal gravity: 10-50 ug; a survey: below 1 ug",
-        description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as "
-        "a floor of "
-        "the scale factor.",
+        description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as a "
+        "floor of the scale factor.",
         confused_with=("accel_scale",),
     )
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.effects.effect import Effect
+from typing import Any
+
+from sdimu_calibration.core.effects.effect import Effect, family
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Work
 
@@ -25,6 +27,11 @@ def register(effect: Effect) -> Effect:
             raise ValueError(f"parameter '{parameter.name}' of '{effect.name}' is registered twice")
     _EFFECTS[effect.name] = effect
     return effect
+
+
+def register_family(*described: Any, **more: Any) -> Effect:
+    """Add the effect that `effect.family` makes of the same arguments."""
+    return register(family(*described, **more))
 
 
 def names() -> tuple[str, ...]:

@@ -5,39 +5,35 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.effect import ACCEL, AXES, GYRO, Effect, Parameter, Term, family, per_axis_columns
+from sdimu_calibration.core.effects.effect import ACCEL, AXES, GYRO, Effect, Parameter, Term, per_axis_columns
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.effects.registry import register
+from sdimu_calibration.core.effects.registry import register, register_family
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 
-GYRO_DELAY = register(
-    family(
-        "gyro_delay",
-        "gyro delay against the other sensors",
-        "dw_i = -tau_i dw_i/dt",
-        per_axis_columns(GYRO, lambda m: -m.alpha),
-        ("s", "ms"),
-        (1, 2, 5),
-        needs_table=True,
-        typical="0.01-5 ms",
-        description="Transport delay or bandwidth. A delay common to all six sensors cannot be seen.",
-        confused_with=("accel_delay", "gyro_acceleration_sensitivity"),
-    )
+GYRO_DELAY = register_family(
+    "gyro_delay",
+    "gyro delay against the other sensors",
+    "dw_i = -tau_i dw_i/dt",
+    per_axis_columns(GYRO, lambda m: -m.alpha),
+    ("s", "ms"),
+    (1, 2, 5),
+    needs_table=True,
+    typical="0.01-5 ms",
+    description="Transport delay or bandwidth. A delay common to all six sensors cannot be seen.",
+    confused_with=("accel_delay", "gyro_acceleration_sensitivity"),
 )
 
-ACCEL_DELAY = register(
-    family(
-        "accel_delay",
-        "accelerometer delay against the gyros (time skew)",
-        "df_i = -tau_i df_i/dt = tau_i (w x f)_i",
-        per_axis_columns(ACCEL, lambda m: -STANDARD_GRAVITY * m.a_rate),
-        ("s", "ms"),
-        (1, 2, 5),
-        needs_table=True,
-        typical="0.01-5 ms; 1 ms makes 14 mm/s in a 90 deg turn",
-        description="The force that an accelerometer reports is older than the attitude of the gyros.",
-        confused_with=("gyro_delay",),
-    )
+ACCEL_DELAY = register_family(
+    "accel_delay",
+    "accelerometer delay against the gyros (time skew)",
+    "df_i = -tau_i df_i/dt = tau_i (w x f)_i",
+    per_axis_columns(ACCEL, lambda m: -STANDARD_GRAVITY * m.a_rate),
+    ("s", "ms"),
+    (1, 2, 5),
+    needs_table=True,
+    typical="0.01-5 ms; 1 ms makes 14 mm/s in a 90 deg turn",
+    description="The force that an accelerometer reports is older than the attitude of the gyros.",
+    confused_with=("gyro_delay",),
 )
 
 
@@ -95,9 +91,8 @@ def lost_data(turn: int, at: float, spacing: float = 15.0) -> Effect:
         regressors=missing,
         prior={"navigation": 0.02, "tactical": 0.02, "mems": 0.02},
         typical="one or a few samples; 10 ms at 2 deg/s are 72 arcsec",
-        description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of "
-        "the recording, "
-        "not of the sensor.",
+        description="Samples dropped before the stamps were given: the angle of one turn is too small. A fault of the "
+        "recording, not of the sensor.",
         scope="recording",
         needs_table=True,
         options={"turn": str(turn), "at": f"{at:g} s"},

@@ -307,14 +307,3 @@ class Fit(ABC):
     def labels(self) -> frozenset[str]:
         """Labels of all parameters that the model, or the estimator for it, has."""
         return frozenset(label for effect in self.sensors.effects for label in effect.labels)
-
-    def size_in_sigmas(self, count: int) -> Floats:
-        """Size of the last `count` parameters of the model.
-
-        Returns
-        -------
-        ndarray, shape (count,)
-            In units of their sigmas (1).
-        """
-        last = slice(len(self.names) - count, None)
-        return np.abs(self.values[last]) / np.sqrt(np.diag(self.covariance)[last])

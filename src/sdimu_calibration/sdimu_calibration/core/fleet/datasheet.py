@@ -56,9 +56,6 @@ class NoiseOfUnit:
     stated: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
 
-_TRIADS = {"gyro": "gyro", "accel": "accelerometer"}
-
-
 def known_terms() -> dict[str, str]:
     """Give every term of a data sheet, and the unit in which people read it."""
     out: dict[str, str] = {}

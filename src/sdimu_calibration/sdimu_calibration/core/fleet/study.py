@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,91 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import BASELINE
-from sdimu_calibration.core.fleet.common import Bytes, CommonEffect, common_effects
-from sdimu_calibration.core.fleet.population import Measured, Population, population, without_those_out
-from sdimu_calibration.core.fleet.trends import Trend, trends
+from sdimu_calibration.core.fleet.common import FALSE_DISCOVERY, Bytes, CommonEffect, adjusted, common_effects
+from sdimu_calibration.core.fleet.population import (
+    Measured,
+    Population,
+    population,
+    unit_values,
+    within_units,
+    without_those_out,
+)
+from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect
+
+YEAR_S = 365.25 * 86400.0
+"""Julian year (s): the unit of time of slopes."""
+PRODUCTION, AGE = "from unit to unit", "in the units"
+_SHORTEST_S = 60.0
+"""Shortest span of dates (s): results of one minute are of one date."""
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Slope of a coefficient with the date.
+
+    Attributes
+    ----------
+    kind : str
+        `PRODUCTION`: between units, by their mean dates; `AGE`: within units that were measured again.
+    slope, slope_sigma : float
+        SI a year.
+    p_value : float
+        If there is no slope.
+    q_value : float
+        Smallest rate of false discoveries at which it is named.
+    """
+
+    coefficient: str
+    kind: str
+    slope: float
+    slope_sigma: float
+    p_value: float
+    q_value: float = 1.0
+    named: bool = False
+
+
+def trends(fleet: Measured, rate: float = FALSE_DISCOVERY) -> tuple[Trend, ...]:
+    """Fit a slope with the date to every coefficient.
+
+    Parameters
+    ----------
+    rate : float
+        False discoveries among the slopes that are named.
+
+    Returns
+    -------
+    tuple of Trend
+        Smallest probability first; none where dates are unknown or all the same.
+    """
+    if not np.isfinite(fleet.dates_s).all():
+        return ()
+    found = [
+        Trend(name, kind, one.slope, one.slope_sigma, one.slope_p)
+        for k, name in enumerate(fleet.names)
+        for kind, one in ((PRODUCTION, _between(fleet, k)), (AGE, _within(fleet, k)))
+        if one is not None
+    ]
+    q_values = adjusted(np.array([one.p_value for one in found]))
+    judged = [replace(one, q_value=float(q), named=bool(q <= rate)) for one, q in zip(found, q_values, strict=True)]
+    return tuple(sorted(judged, key=lambda one: one.p_value))
+
+
+def _between(fleet: Measured, k: int) -> RandomEffect | None:
+    """Slope over units; None for fewer than four, or all of one date."""
+    member = np.equal.outer(np.array(fleet.units), np.array(fleet.serials)).astype(float)
+    dates = member @ fleet.dates_s / member.sum(axis=1)
+    if len(dates) < 4 or np.ptp(dates) < _SHORTEST_S:
+        return None
+    return random_effect(*unit_values(fleet, k, within_units(fleet, k)), x=(dates - dates.mean()) / YEAR_S)
+
+
+def _within(fleet: Measured, k: int) -> RandomEffect | None:
+    """Slope in the units that have several results; None where there are too few, or all of one date."""
+    serials, dates = np.array(fleet.serials), fleet.dates_s
+    spans = [np.ptp(dates[serials == unit]) for unit in fleet.units]
+    if len(serials) - len(spans) < 2 or max(spans) < _SHORTEST_S:
+        return None
+    return random_effect(fleet.values[:, k], fleet.sigmas[:, k], fleet.serials, (dates - dates.mean()) / YEAR_S)
 
 
 @dataclass(frozen=True)

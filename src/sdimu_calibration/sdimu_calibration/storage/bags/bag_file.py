@@ -236,8 +236,8 @@ def _take(block: Messages, channel: int, unpack: Unpack | None, target: RawMessa
     if unpack is None:
         target.extend(messages)
         return
-    for start, length in zip(messages.start, messages.length, strict=True):
-        target.append(unpack(block.content[start : start + length]))
+    for message in messages:
+        target.append(unpack(message))
 
 
 def check_magic(part: Path) -> None:

@@ -22,9 +22,6 @@ from sdimu_calibration.storage.bags.raw_messages import RawMessages
 from sdimu_calibration.storage.bags.status_message import phase_entry, phase_of, stamp_ns
 from sdimu_calibration.storage.bags.topic_choice import KINDS, TopicChoice, Topics, choose
 
-_WITH_STAMP = 12
-"""Bytes of a message that has a stamp, at least."""
-
 
 def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Recording:
     """Read a bag.
@@ -106,7 +103,7 @@ def _decoded_status(without_stamp: bytes) -> tuple[str, Mapping[str, str]]:
 
 def _status(raw: Sequence[bytes], topic: str, notes: list[str]) -> RawStatus | None:
     """Phases in the order of arrival; a message that says none is ignored."""
-    found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw if len(data) >= _WITH_STAMP)
+    found = (phase_entry(cdr.stamp_of(data), *_status_entry(data)) for data in raw if len(data) >= cdr.WITH_STAMP)
     parsed = [entry for entry in found if entry is not None]
     if len(parsed) < len(raw):
         notes.append(f"{len(raw) - len(parsed)} messages of {topic} said neither dwell nor rotating: ignored")

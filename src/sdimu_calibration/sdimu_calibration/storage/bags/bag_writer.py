@@ -53,34 +53,20 @@ def write_recording(
         What the user says of the recording: ``serial``, ``power_on``.
     """
     topics = topics or Topics()
-    streams = [_Stream(topics.imu, cdr.IMU, imu_ns, cdr.encode_imu(imu_ns + start_ns, omega_ib_b, f_ib_b))]
+    streams = {topics.imu: (cdr.IMU, imu_ns, cdr.encode_imu(imu_ns + start_ns, omega_ib_b, f_ib_b))}
     if status is not None:
         ns, dwell, stop = status
-        streams.insert(0, _Stream(topics.status, cdr.STATUS, ns, cdr.encode_status(ns + start_ns, dwell, stop)))
+        # At the same stamp the status goes first, as it holds from that stamp on.
+        streams = {topics.status: (cdr.STATUS, ns, cdr.encode_status(ns + start_ns, dwell, stop))} | streams
     if joint_states is not None:
         ns, names, position, velocity = joint_states
         encoded = cdr.encode_joint_states(ns + start_ns, names, position, velocity)
-        streams.append(_Stream(topics.joint_states, cdr.JOINT_STATE, ns, encoded))
+        streams[topics.joint_states] = (cdr.JOINT_STATE, ns, encoded)
     if temperature is not None:
         ns, value = temperature
-        encoded = cdr.encode_temperature(ns + start_ns, value)
-        streams.append(_Stream(topics.temperature, cdr.TEMPERATURE, ns, encoded))
-    _write(path, streams, start_ns, replace, custom)
-
-
-class _Stream:
-    """Encoded messages of one topic."""
-
-    def __init__(self, topic: str, type_name: str, ns: Stamps, encoded: list[bytes]) -> None:
-        self.topic = topic
-        self.type_name = type_name
-        self.ns = np.asarray(ns, np.int64)
-        self.encoded = encoded
-
-
-def _write(path: Path, streams: list[_Stream], start_ns: int, replace: bool, custom: Mapping[str, str] | None) -> None:
+        streams[topics.temperature] = (cdr.TEMPERATURE, ns, cdr.encode_temperature(ns + start_ns, value))
     with McapBag(path, replace=replace, custom=custom) as bag:
-        for stream in streams:
-            bag.topic(stream.topic, stream.type_name)
-        # At the same stamp the status goes first, as it holds from that stamp on.
-        bag.write_merged({stream.topic: (stream.ns + start_ns, stream.encoded) for stream in streams})
+        for topic, (type_name, _, _) in streams.items():
+            bag.topic(topic, type_name)
+        stamped = {topic: (np.asarray(ns, np.int64) + start_ns, data) for topic, (_, ns, data) in streams.items()}
+        bag.write_merged(stamped)

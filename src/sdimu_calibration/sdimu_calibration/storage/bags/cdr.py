@@ -27,7 +27,8 @@ STATUS = "diagnostic_msgs/msg/DiagnosticArray"
 TEMPERATURE = "sensor_msgs/msg/Temperature"
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"
-_STAMP_END = 12
+WITH_STAMP = 12
+"""Bytes of a message that has a stamp, at least."""
 # Places among the 37 doubles of an Imu message: orientation 4, covariance 9, rate 3, covariance 9, force 3, ...
 _IMU_DOUBLES, _RATE, _FORCE = 37, slice(13, 16), slice(25, 28)
 
@@ -120,7 +121,7 @@ def stamp_of(message: bytes) -> int:
     LayoutError
         When the message ends before its stamp does.
     """
-    if len(message) < _STAMP_END:
+    if len(message) < WITH_STAMP:
         raise LayoutError("message too short")
     order = _order(message)
     sec = int.from_bytes(message[4:8], order, signed=True)
@@ -143,8 +144,8 @@ def by_stamp(raw: Sequence[bytes], topic: str) -> tuple[Stamps, list[bytes]]:
     messages : list of bytes, length n
     """
     messages = list(raw)
-    if any(len(message) < _STAMP_END for message in messages):
-        number = 1 + next(k for k, message in enumerate(messages) if len(message) < _STAMP_END)
+    if any(len(message) < WITH_STAMP for message in messages):
+        number = 1 + next(k for k, message in enumerate(messages) if len(message) < WITH_STAMP)
         raise DataError(f"{topic}: message {number} has no stamp: the bag is damaged")
     ns = np.fromiter(map(stamp_of, messages), np.int64, len(messages))
     order = np.argsort(ns, kind="stable")
@@ -303,7 +304,7 @@ def decode_imu_block(block: Block) -> tuple[Stamps, Floats, Floats]:
 def _decode_block(block: Block, number: int, parts: Sequence[slice]) -> tuple[Stamps, list[Floats]]:
     """Decode the messages of one block, as `_decode_parts`."""
     start = block.length - 8 * number
-    if (start < _STAMP_END + 4).any():
+    if (start < WITH_STAMP + 4).any():
         raise LayoutError("message too short")
     text = 12 + block.field(12, "<u4")[:, 0].astype(np.int64)
     if (block.field(1, np.uint8) != 1).any() or (4 + text + -text % 8 != start).any():
@@ -317,10 +318,10 @@ class _Cursor:
     """Reads one message from front to back, from behind the stamp of its header."""
 
     def __init__(self, message: bytes) -> None:
-        if len(message) < _STAMP_END:
+        if len(message) < WITH_STAMP:
             raise LayoutError("message too short")
         self._message, self._order = message, _order(message)
-        self._place = _STAMP_END
+        self._place = WITH_STAMP
         self.string()  # frame_id
 
     def skip(self, size: int) -> bytes:

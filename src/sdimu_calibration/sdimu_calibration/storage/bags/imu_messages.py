@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mmap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from tempfile import TemporaryFile, gettempdir
 from typing import Any
 
@@ -106,7 +106,7 @@ class ImuMessages(RawMessages):
         return ns[kept], omega[kept], force[kept]
 
     def _all(self, one_by_one: Callable[[Sequence[bytes]], Samples]) -> Samples:
-        found = [one_by_one(list(_messages_of(part))) if isinstance(part, Block) else part for part in self._decoded]
+        found = [one_by_one(list(part)) if isinstance(part, Block) else part for part in self._decoded]
         self._decoded = []
         if self._file is not None:
             self._file.append(found)
@@ -141,8 +141,3 @@ class ImuMessages(RawMessages):
         self._file = self._file or SampleFile()
         self._file.append([part for part in known if not isinstance(part, Block)])
         self._waiting = 0
-
-
-def _messages_of(block: Block) -> Iterator[bytes]:
-    for start, length in zip(block.start.tolist(), block.length.tolist(), strict=True):
-        yield block.buffer[start : start + length]

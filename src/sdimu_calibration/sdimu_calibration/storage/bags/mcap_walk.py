@@ -29,8 +29,6 @@ _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 1, 2, 3, 4, 5, 6
 _STATISTICS, _DATA_END = 11, 15
-_LARGEST = 1 << 32
-"""Bytes of a record beyond which its length is taken for damage."""
 _PIECE = 1 << 20
 
 

@@ -25,6 +25,11 @@ class Block:
         self.start = start
         self.length = length
 
+    def __iter__(self) -> Iterator[bytes]:
+        """Yield the bytes of each message."""
+        for start, length in zip(self.start.tolist(), self.length.tolist(), strict=True):
+            yield self.buffer[start : start + length]
+
     def field(self, place: int | Ints, dtype: DTypeLike, count: int = 1) -> NDArray[Any]:
         """Take the same field of every message.
 
@@ -49,8 +54,7 @@ class Block:
         if (self.length == self.length[0]).all():
             content = self.field(0, np.uint8, int(self.length[0])).tobytes() if self.length[0] else b""
         else:
-            places = zip(self.start.tolist(), self.length.tolist(), strict=True)
-            content = b"".join(self.buffer[start : start + length] for start, length in places)
+            content = b"".join(self)
         return Block(content, np.cumsum(self.length) - self.length, self.length)
 
 
@@ -90,8 +94,7 @@ class RawMessages(Sequence[bytes]):
     def __iter__(self) -> Iterator[bytes]:
         """Yield the bytes of each message."""
         for block in self.blocks():
-            for start, length in zip(block.start.tolist(), block.length.tolist(), strict=True):
-                yield block.buffer[start : start + length]
+            yield from block
 
     @overload
     def __getitem__(self, place: int) -> bytes: ...

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
@@ -116,15 +114,7 @@ def _found(path: Path, content: Mapping[str, TopicContent], kind: str, is_phase:
 
 def _extent(raw: RawMessages) -> str:
     """Say how many messages there are, and their rate by header.stamp."""
-    stamps = [_stamp_ns(message) for message in raw.ends()]
+    stamps = [cdr.stamp_of(message) if len(message) >= cdr.WITH_STAMP else 0 for message in raw.ends()]
     span = (stamps[1] - stamps[0]) * 1e-9
     rate = f", {(len(raw) - 1) / span:.4g} Hz" if span > 0.0 else ""
     return f"{len(raw)} messages{rate}"
-
-
-def _stamp_ns(message: bytes) -> int:
-    if len(message) < 12:
-        return 0
-    order = "<" if message[1] == 1 else ">"
-    second, nanosecond = (int(np.frombuffer(message, f"{order}u4", 1, at)[0]) for at in (4, 8))
-    return second * 1_000_000_000 + nanosecond

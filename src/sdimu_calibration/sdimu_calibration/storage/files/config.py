@@ -370,15 +370,10 @@ def load_imu(name_or_path: str | Path) -> ImuSpecification:
         file=str(path),
         gyro_white_noise=file.noise.gyro,
         accel_white_noise=file.noise.accel,
+        **file.noise.model_dump(exclude={"gyro", "accel"}),
         prior={name: size for name, (size, _) in file.prior.items()},
         prior_units={name: unit for name, (_, unit) in file.prior.items()},
         grade=file.grade,
-        gyro_random_walk=file.noise.gyro_random_walk,
-        accel_random_walk=file.noise.accel_random_walk,
-        gyro_quantisation=file.noise.gyro_quantisation,
-        accel_quantisation=file.noise.accel_quantisation,
-        gyro_bias_instability=file.noise.gyro_bias_instability,
-        accel_bias_instability=file.noise.accel_bias_instability,
     )
 
 

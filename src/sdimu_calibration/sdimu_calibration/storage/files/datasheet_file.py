@@ -11,11 +11,9 @@ from typing import Any
 from sdimu_calibration.core.fleet.sheet import Line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.fleet_folder import Entry
-from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.json_file import entry, write_json
 
 FORMAT = "sdimu-datasheet/1"
-_READ = 1 << 20
-"""Bytes that are read at once."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entri
             "format": FORMAT,
             **{key: value for key, value in asdict(about).items() if key != "recordings"},
             "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
-            "results": [{"name": entry.name, "unit": entry.unit} for entry in entries],
+            "results": [entry(one, "name unit") for one in entries],
             "lines": [_line(line) for line in lines],
         },
     )
@@ -110,8 +108,5 @@ def file_hashes(path: Path) -> dict[Path, tuple[str, str]]:
 
 
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while block := stream.read(_READ):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()

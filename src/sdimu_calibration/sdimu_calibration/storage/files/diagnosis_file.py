@@ -15,7 +15,6 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.bootstrap import Null
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
-from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.scan import scan
@@ -30,6 +29,7 @@ from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, Said, read_model
 from sdimu_calibration.storage.files.standing_file import KnownEntry
 
@@ -41,6 +41,8 @@ FORMAT: Final = "sdimu-diagnosis/1"
 SET_FORMAT: Final = "sdimu-set-diagnosis/1"
 _MOST = 5000
 """Number of estimates at most: a catalogue has hundreds, and what is unpacked must be bounded."""
+_TEST = "chi2 dof p=p_value"
+"""Keys of a test of free inputs, as for `entry`."""
 
 
 Row = dict[str, Any] | None
@@ -122,9 +124,7 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
         p_value=d.p_value,
         verdict=d.verdict,
         sentence=d.sentence,
-        where=[
-            {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
-        ],
+        where=[entry(w, "channel stop normalised_mean") for w in d.consistency.where],
         probabilities=odds(d.probabilities),
         candidates=[candidate(f, d.own) for f in summary.candidates],
         partial=[candidate(f, d.own) for f in summary.found] if is_unexplained else [],
@@ -134,26 +134,20 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
             "best_variables": [f.candidate.label for f in summary.found] if is_unexplained or d.own else [],
         },
         advice=tuple(map(sentence, summary.advice)),
-        findings=[{"text": f.text, "grave": f.grave} for f in d.findings],
+        findings=[entry(f, "text grave") for f in d.findings],
         noise={
             "wrong": list(d.noise),
             "terms": [asdict(term) | {"unit": term.unit, "words": term.words} for term in d.found.noise],
             "gyro": _noise(d.consistency.gyro),
             "accel": _noise(d.consistency.accel),
         },
-        consistency={
-            "nis_mean": d.consistency.nis_mean,
-            "nis_p_value": d.consistency.nis_p_value,
-            "first_nis": d.consistency.first_nis,
-            "ljung_box_p": d.consistency.ljung_box_p,
-            "threshold": d.found.threshold,
-        },
-        free_inputs={"before": _free_inputs(d.free_inputs_before), "after": _free_inputs(d.free_inputs_after)},
+        consistency=entry(d.consistency, "nis_mean nis_p_value first_nis ljung_box_p", threshold=d.found.threshold),
+        free_inputs={"before": entry(d.free_inputs_before, _TEST), "after": entry(d.free_inputs_after, _TEST)},
         alone=alone(d.evidence, d.free.tolist()),
         known=KnownEntry.of(standing(d, summary.found)),
         fit={"before": fit_of(d.before), "after": fit_of(d.after)},
-        ladder=[step_of(s) for s in d.found.steps],
-        grown=[_rung(r) for r in d.rungs],
+        ladder=list(map(step_of, d.found.steps)),
+        grown=list(map(_rung, d.rungs)),
         plan=_plan(summary.plan),
         not_testable=[reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
         smallest_detectable=[reach_of(r) for r in summary.reached if r.testable],
@@ -199,18 +193,19 @@ def alone(evidence: LinearEvidence, free: Sequence[int] = ()) -> Alone:
     first = scan(evidence.information, evidence.model, evidence.weight)
     J = evidence.information.given(evidence.model, evidence.weight).J
     p = len(evidence.weight)
-    shown = [
-        (evidence.candidates[k - p], k)
+    columns = [
+        k
         for k in range(p, len(evidence.names))
         if k not in free and np.isfinite(first.sigma[k]) and evidence.candidates[k - p].family != "own"
     ]
+    candidates = [evidence.candidates[k - p] for k in columns]
     return Alone.model_construct(
-        labels=[candidate.label for candidate, _ in shown],
-        units=[candidate.parameter.unit for candidate, _ in shown],
-        display_units=[candidate.parameter.display_unit for candidate, _ in shown],
-        estimates=[float(first.estimate[k]) for _, k in shown],
-        sigmas=[float(first.sigma[k]) for _, k in shown],
-        correlations=packed(J[np.ix_(*[[k for _, k in shown]] * 2)]),
+        labels=[one.label for one in candidates],
+        units=[one.parameter.unit for one in candidates],
+        display_units=[one.parameter.display_unit for one in candidates],
+        estimates=first.estimate[columns].tolist(),
+        sigmas=first.sigma[columns].tolist(),
+        correlations=packed(J[np.ix_(columns, columns)]),
     )
 
 
@@ -218,89 +213,40 @@ def _plan(plan: PlanSeen | None) -> dict[str, Any] | None:
     """Give the turns of a table as plain data; None where there is no table."""
     if plan is None:
         return None
-    return {
-        "turns": [
-            {
-                "after_stop": t.after_stop,
-                "axis": None if t.axis is None else "xyz"[t.axis],
-                "angle": t.angle,
-                "rate": t.rate,
-            }
-            for t in plan.turns
-        ],
-        "oblique_stops": plan.oblique,
-    }
+    turns = [entry(t, "after_stop axis angle rate") for t in plan.turns]
+    named = [turn | {"axis": None if turn["axis"] is None else "xyz"[turn["axis"]]} for turn in turns]
+    return {"turns": named, "oblique_stops": plan.oblique}
 
 
 def odds(told: Probabilities | None) -> Row:
     """Give the probabilities of a diagnosis as plain data (SI); None where there are none."""
     if told is None:
         return None
+    member = "label p=probability value sigma unit display_unit"
     return {
         "nothing_missing": told.nothing,
         "families": [
-            {
-                "family": family.family,
-                "sensor": family.sensor,
-                "p": family.probability,
-                "members": [
-                    {
-                        "label": one.label,
-                        "p": one.probability,
-                        "value": one.value,
-                        "sigma": one.sigma,
-                        "unit": one.unit,
-                        "display_unit": one.display_unit,
-                    }
-                    for one in family.members
-                ],
-            }
+            entry(family, "family sensor p=probability", members=[entry(one, member) for one in family.members])
             for family in told.families
         ],
-        "noise": [
-            {
-                "triad": noise.triad,
-                "kind": noise.kind,
-                "p": noise.probability,
-                "size": noise.size,
-                "low": noise.low,
-                "high": noise.high,
-                "unit": noise.unit,
-            }
-            for noise in told.noise
-        ],
+        "noise": [entry(noise, "triad kind p=probability size low high unit") for noise in told.noise],
     }
 
 
 def candidate(f: Found, own: bool) -> dict[str, Any]:
     """Give an effect that was found as plain data."""
-    parameter = f.candidate.parameter
+    of = "candidate.parameter"
     return {
         "effect": f.candidate.label if own else f.candidate.family,
         "label": f.candidate.label,
-        "parameters": [
-            {
-                "name": parameter.name,
-                "value": f.value,
-                "sigma": f.sigma,
-                "unit": parameter.unit,
-                "display_unit": parameter.display_unit,
-            }
-        ],
+        "parameters": [entry(f, f"name={of}.name value sigma unit={of}.unit display_unit={of}.display_unit")],
         "probability": f.probability,
-        "may_be": [{"name": share.name, "p": share.probability} for share in f.may_be],
+        "may_be": [entry(share, "name p=probability") for share in f.may_be],
         "same_together": [{"labels": [one, other], "p": p} for one, other, p in f.together],
-        "z": f.z,
-        "delta_log_likelihood": f.log_likelihood_gain,
-        "log_bayes_factor": f.log_bayes_factor,
-        "p_value_adjusted": f.p_value_adjusted,
-        "explained": f.explained,
-        "held_out_rms_before": f.held_out_before,
-        "held_out_rms_after": f.held_out_after,
+        **entry(f, "z delta_log_likelihood=log_likelihood_gain log_bayes_factor p_value_adjusted explained"),
+        **entry(f, "held_out_rms_before=held_out_before held_out_rms_after=held_out_after"),
         "indistinguishable_from": list(f.alike),
-        "depends_on_choice": [
-            {"instead": s.other, "coefficient": s.coefficient, "sigmas": s.sigmas} for s in f.coefficient_shifts
-        ],
+        "depends_on_choice": [entry(s, "instead=other coefficient sigmas") for s in f.coefficient_shifts],
     }
 
 
@@ -314,7 +260,7 @@ def _unexplained_fraction(d: Diagnosis) -> float:
 
 
 def _noise(noise: Noise) -> dict[str, Any]:
-    return {"ratio": noise.ratio, "sigma": noise.sigma, "kurtosis": noise.kurtosis, "outliers": len(noise.outliers)}
+    return entry(noise, "ratio sigma kurtosis", outliers=len(noise.outliers))
 
 
 def fit_of(calibration: Calibration) -> dict[str, Any]:
@@ -324,73 +270,40 @@ def fit_of(calibration: Calibration) -> dict[str, Any]:
 
 def step_of(s: Step) -> dict[str, Any]:
     """Give a step of the search as plain data."""
-    return {
-        "label": s.label,
-        "effect": s.family,
-        "z": s.z,
-        "threshold": s.threshold,
-        "estimate": s.estimate,
-        "sigma": s.sigma,
-        "unit": s.unit,
-        "log_likelihood_gain": s.log_likelihood_gain,
-        "log_bayes_factor": s.log_bayes_factor,
-        "one_stop_out_before": s.held_out_before.rms,
-        "one_stop_out_after": s.held_out_after.rms,
-        "held_out_gain": s.held_out_gain,
-        "held_out_error": s.held_out_error,
-        "indistinguishable_from": list(s.alike),
-        "moved": [{"name": name, "sigmas": size} for name, size in s.moved],
-    }
+    return entry(
+        s,
+        "label effect=family z threshold estimate sigma unit log_likelihood_gain log_bayes_factor"
+        " one_stop_out_before=held_out_before.rms one_stop_out_after=held_out_after.rms held_out_gain held_out_error",
+        indistinguishable_from=list(s.alike),
+        moved=_moved(s),
+    )
+
+
+def _moved(s: Step | Rung) -> list[dict[str, Any]]:
+    return [{"name": name, "sigmas": size} for name, size in s.moved]
 
 
 def _null(null: Null) -> dict[str, Any]:
-    return {
-        "draws": null.draws,
-        "false_finds": null.false_finds,
-        "threshold": null.threshold,
-        "rms_z": null.rms_z,
-        "largest": null.largest,
-        "remainder_p": null.free_input_p,
-    }
+    return entry(null, "draws false_finds threshold rms_z largest remainder_p=free_input_p")
 
 
 def _rung(r: Rung) -> dict[str, Any]:
-    return {
-        "added": r.added,
-        "accepted": r.accepted,
-        "reason": r.reason,
-        "log_likelihood": r.log_likelihood,
-        "log_bayes_factor": r.log_bayes_factor,
-        "nis_mean": r.nis_mean,
-        "held_out_rms": r.held_out_rms,
-        "jump": r.jump,
-        "jump_velocity": r.jump_velocity,
-        "moved": [{"name": name, "sigmas": size} for name, size in r.moved],
-        "beyond_white_noise": None
-        if r.scatter is None
-        else {"force_m_s2": r.scatter[FORCE], "rate_rad_s": r.scatter[RATE], "turn_share": r.scatter[TURN]},
+    scatter = r.scatter and {
+        "force_m_s2": r.scatter[FORCE],
+        "rate_rad_s": r.scatter[RATE],
+        "turn_share": r.scatter[TURN],
     }
+    names = "added accepted reason log_likelihood log_bayes_factor nis_mean held_out_rms jump jump_velocity"
+    return entry(r, names, moved=_moved(r), beyond_white_noise=scatter)
 
 
 def reach_of(r: DetectableSize) -> dict[str, Any]:
     """Give what could have been seen of one effect as plain data."""
-    return {
-        "label": r.label,
-        "effect": r.family,
-        "retention": r.retention,
-        "smallest": r.smallest,
-        "unit": r.unit,
-        "display_unit": r.display_unit,
-        "taken_by": list(r.partners),
-    }
+    return entry(r, "label effect=family retention smallest unit display_unit", taken_by=list(r.partners))
 
 
 def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:
     return next((b.reason for b in summary.untestable if r.label in b.labels), "")
-
-
-def _free_inputs(test: FreeInputTest) -> dict[str, Any]:
-    return {"chi2": test.chi2, "dof": test.dof, "p": test.p_value}
 
 
 class SetDiagnosisFile(ResultModel):

@@ -18,7 +18,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.files.config import find_config, read_mapping
 from sdimu_calibration.storage.files.fleet_folder import Gathered
-from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.json_file import entry, write_json
 from sdimu_calibration.storage.files.result_file import plain_origin
 from sdimu_calibration.storage.files.whole_file import same_file, write_whole
 
@@ -44,9 +44,7 @@ def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
             "imu": first.origin.imu,
             "model": list(first.model),
             "body_frame": first.body_frame,
-            "results": [
-                {"name": e.name, "unit": e.unit, "origin": plain_origin(e.result.origin)} for e in gathered.entries
-            ],
+            "results": [entry(e, "name unit", origin=plain_origin(e.result.origin)) for e in gathered.entries],
             "apart": list(gathered.apart),
             "units": list(done.people.units),
             "coefficients": [
@@ -66,19 +64,11 @@ def _coefficient(one: Coefficient, limits: tuple[float, float], unit: str, displ
         "name": one.name,
         "unit": unit,
         "display_unit": display_unit,
-        "mean": one.between.mean,
-        "mean_low": low,
-        "mean_high": high,
+        **entry(one.between, "mean", mean_low=low, mean_high=high),
         **_spread("spread", one.between),
         **({} if one.within is None else _spread("within", one.within)),
-        "q": one.between.q,
-        "dof": one.between.dof,
-        "p_value": one.between.p_value,
-        "control_low": limits[0],
-        "control_high": limits[1],
-        "values": one.values,
-        "sigmas": one.sigmas,
-        "deviates": one.deviates,
+        **entry(one.between, "q dof p_value", control_low=limits[0], control_high=limits[1]),
+        **entry(one, "values sigmas deviates"),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,20 @@ def write_json(path: Path, content: Any) -> None:
 def json_text(content: Any) -> str:
     """Write `content` as `write_json` does, as text."""
     return _text(content, "\n")
+
+
+def entry(value: Any, keys: str, **more: Any) -> dict[str, Any]:
+    """Give an object as an entry of a file.
+
+    Parameters
+    ----------
+    keys : str
+        Its keys in their order: the name of an attribute, or ``key=attribute`` where the file has another word for it.
+    more
+        Keys that come after them.
+    """
+    pairs = (word.partition("=") for word in keys.split())
+    return {key: attrgetter(attribute or key)(value) for key, _, attribute in pairs} | more
 
 
 def read_json(path: Path, expected_format: str) -> dict[str, Any]:

@@ -33,6 +33,7 @@ from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import config_folder, load_imu
+from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_model import (
     Array,
     Entry,
@@ -166,21 +167,14 @@ def write_result(path: Path, calibration: Calibration, verdict: Verdict | None =
     ResultFile.model_construct(
         format=FORMAT,
         **{key: value for key, value in seldom.items() if value},
-        origin=c.origin,
-        estimator=c.estimator,
-        estimator_reason=c.estimator_reason,
-        body_frame=c.body_frame,
+        **entry(c, "origin estimator estimator_reason body_frame model covariance noise history"),
         drift_means=dict(c.drift_means),
-        model=c.model,
         coefficients=_coefficients(c),
-        covariance=c.covariance,
         fit=dict(c.fit),
         data=Data.model_construct(**dict[str, Any](c.data), faults=c.faults),
-        noise=c.noise,
         **({} if c.of_set is None else _of_set(c.of_set)),
         notes=told(c.notes),
         warnings=told(c.warnings),
-        history=c.history,
     ).write(path)
 
 
@@ -244,29 +238,20 @@ def _calibration(file: ResultFile) -> Calibration:
     coefficients, p = file.coefficients, len(file.coefficients)
     conditional = all("conditional_sigma" in c.model_fields_set for c in coefficients)
     return Calibration(
-        body_frame=file.body_frame,
-        model=file.model,
+        **entry(file, "body_frame model fit estimator estimator_reason noise rests origin references drift_means"),
         names=tuple(c.name for c in coefficients),
         units=tuple(c.unit for c in coefficients),
         display_units=tuple(c.display_unit if "display_unit" in c.model_fields_set else c.unit for c in coefficients),
         values=np.array([c.value for c in coefficients], float),
         covariance=file.covariance.reshape(p, p),
-        fit=file.fit,
         data=file.data.model_extra or {},
         notes=tuple(map(as_note, file.notes)),
         history=no_history(p) if file.history is None else _whole_history(file.history, p),
         warnings=tuple(map(as_note, file.warnings)),
         faults=file.data.faults,
-        estimator=file.estimator,
-        estimator_reason=file.estimator_reason,
-        noise=file.noise,
         conditional_sigma=np.array([c.conditional_sigma for c in coefficients], float) if conditional else None,
-        rests=file.rests,
-        origin=file.origin,
         imu_noise=None if file.imu_noise is None else file.imu_noise.specification,
-        references=file.references,
         of_set=_set_summary(file, p) if file.recordings else None,
-        drift_means=file.drift_means,
     )
 
 

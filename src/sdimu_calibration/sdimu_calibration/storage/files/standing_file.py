@@ -11,7 +11,7 @@ from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.evidence.known import Known, Standing, known_from
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu
-from sdimu_calibration.storage.files.json_file import read_json
+from sdimu_calibration.storage.files.json_file import entry, read_json
 from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, wrong
 
@@ -34,16 +34,8 @@ class KnownEntry(ResultModel):
     @classmethod
     def of(cls, standing: Standing) -> KnownEntry:
         """Make the entry of what is known."""
-        known = standing.known
         return cls.model_construct(
-            names=known.names,
-            information=known.J,
-            prior=known.prior,
-            scatter=known.scatter,
-            added=standing.added,
-            open=standing.open,
-            imu=standing.imu,
-            site=standing.site,
+            **entry(standing.known, "names information=J prior scatter"), **entry(standing, "added open imu site")
         )
 
     @property
