@@ -25,11 +25,15 @@ def plain(**options: Any) -> Console:
 
 
 def say(console: Console, text: str) -> None:
-    """Print a line: wrapped between words in a terminal, whole in a pipe, so that it can be searched."""
-    line = one_line(text, None)
+    """Print a line: wrapped between words in a terminal, whole in a pipe, so that it can be searched.
+
+    Spaces before the first word stay: they say that the line belongs to the one above.
+    """
+    indent = " " * (len(text) - len(text.lstrip(" ")))
+    line = indent + one_line(text, None)
     if console.is_terminal:
         line = textwrap.fill(
-            line, console.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+            line, console.width, subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False
         )
     console.print(line, soft_wrap=True, highlight=False)
 

@@ -278,7 +278,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
 
 def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
-    from sdimu_calibration.cli.diagnosis_text import print_out_of_sight
+    from sdimu_calibration.cli.diagnosis_text import cost_lines, print_out_of_sight
     from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
@@ -291,6 +291,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.files.whole_file import written_together
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.trace import traced
@@ -300,8 +301,9 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         opened = open_test(out / "bag", site, load_imu(imu))
-        diagnosis = climb(solve(opened, extended_model(model, ())))
-        summary, more = summarise(diagnosis), report_extras(diagnosis)
+        fit = solve(opened, extended_model(model, ()))
+        diagnosis = climb(fit)
+        summary, more = summarise(diagnosis), report_extras(diagnosis, fit)
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
@@ -319,7 +321,8 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         )
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
-    console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
+    for text in (headline(summary), *cost_lines(summary, more)):
+        console.print(text, soft_wrap=True, highlight=False)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result

@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
@@ -39,6 +40,7 @@ from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
 from sdimu_calibration.report.workbench.setting import Setting
+from sdimu_calibration.storage.files.verdict_words import headline
 
 Tell = Callable[[str, float], None]
 _MOST_KEPT = 200
@@ -169,7 +171,7 @@ class FitSession:
                     tuple(data.scored(scores)),
                     scores.found.threshold,
                     told.adequate,
-                    told.sentence,
+                    headline(summarise(told)),
                     scores.free_inputs_after,
                     scores.fit.held_out_rms(),
                     told.probabilities,

@@ -32,6 +32,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, Said, read_model
 from sdimu_calibration.storage.files.standing_file import KnownEntry
+from sdimu_calibration.storage.files.verdict_words import headline
 
 if TYPE_CHECKING:
     # A diagnosis of one recording does not load what joins several.
@@ -121,7 +122,7 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
         adequate=d.adequate,
         p_value=d.p_value,
         verdict=d.verdict,
-        sentence=d.sentence,
+        sentence=headline(summary),
         where=[
             {"channel": w.channel, "stop": w.stop, "normalised_mean": w.normalised_mean} for w in d.consistency.where
         ],
