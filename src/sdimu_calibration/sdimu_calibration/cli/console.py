@@ -38,6 +38,25 @@ def say(console: Console, text: str) -> None:
     console.print(line, soft_wrap=True, highlight=False)
 
 
+def pair(console: Console, name: str, text: str, width: int) -> None:
+    """Print a name and what is said of it, below the names and texts of other pairs.
+
+    Parameters
+    ----------
+    console : Console
+    name, text : str
+    width : int
+        Characters of the longest name.
+    """
+    before = f"  {one_line(name, None):{width}}  "
+    line = before + one_line(text, None)
+    if console.is_terminal:
+        line = textwrap.fill(
+            line, console.width, subsequent_indent=" " * len(before), break_long_words=False, break_on_hyphens=False
+        )
+    console.print(line, soft_wrap=True, highlight=False)
+
+
 def command(console: Console, text: str) -> None:
     """Print a command to paste: on a line of its own, which is never broken."""
     console.print(f"  {one_line(text, None)}", soft_wrap=True, highlight=False)

@@ -164,7 +164,7 @@ class Children:
         given = {key: value for key, value in parameters.items() if value != []}
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.
         file = self._log / f"{name}.yaml"
-        file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}), encoding="utf-8")
+        file.write_text(_dumped({name: {"ros__parameters": given}}), encoding="utf-8")
         self.run(name, module, ["--ros-args", "--params-file", str(file)])
 
     def run(self, name: str, module: str, arguments: Sequence[str]) -> None:
@@ -213,6 +213,22 @@ class Children:
             except subprocess.TimeoutExpired:  # noqa: PERF203 (three processes)
                 process.kill()
                 process.wait()
+
+
+class _Quoted(yaml.SafeDumper):
+    """Writes every text in quotes: ROS takes a bare ``y`` for true, where YAML's own rules keep it a text."""
+
+
+def _quoted(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"')
+
+
+_Quoted.add_representer(str, _quoted)
+
+
+def _dumped(parameters: Mapping[str, Any]) -> str:
+    """Write a file of ROS parameters."""
+    return str(yaml.dump(parameters, Dumper=_Quoted, width=10**6))
 
 
 def _die_with_parent() -> None:

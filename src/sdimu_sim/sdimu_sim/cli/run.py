@@ -65,6 +65,7 @@ def run(
     world: World,
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite an earlier run in that folder.")] = False,
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process.
 
@@ -85,7 +86,7 @@ def run(
     with own_folder(out):
         begun = time.monotonic()
         with own_domain(out / "log", domain) as used, Children(out / "log") as children:
-            replace = _clear(out, test.followed)
+            _clear(out, test.followed, replace)
             console.print(f"ROS domain {used}", highlight=False)
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
@@ -149,8 +150,8 @@ def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
         raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
 
 
-def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
-    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
+def _clear(out: Path, plan: str = DEFAULT_PLAN, replace: bool = False) -> None:
+    """Remove the results of an earlier run, once nothing refuses this one: `replace` is asked where there is a bag.
 
     The file of the plan that is to be followed stays.
     """
@@ -159,15 +160,14 @@ def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
 
-    bag, replace = out / "bag", (out / "log" / "rate_table.yaml").is_file()
-    if not replace and (bag / METADATA).is_file():
+    bag, earlier = out / "bag", (out / "log" / "rate_table.yaml").is_file()
+    if not earlier and (bag / METADATA).is_file():
         raise DataError(f"{bag}: is a bag of no earlier run; move it, or name another folder with --out")
     check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
-    if replace and not _is_file(plan, out / PLAN):
+    if earlier and not _is_file(plan, out / PLAN):
         (out / PLAN).unlink(missing_ok=True)
-    return replace
 
 
 def _check(options: dict[str, dict[str, Any]]) -> float:
@@ -303,7 +303,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         opened = open_test(out / "bag", site, load_imu(imu))
         fit = solve(opened, extended_model(model, ()))
         diagnosis = climb(fit)
-        summary, more = summarise(diagnosis), report_extras(diagnosis, fit)
+        summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
@@ -326,6 +326,18 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result
+
+
+def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisSummary:
+    """Leave out advice to drive other turns where the test itself chose them: its goals ask for what they show."""
+    from dataclasses import replace
+
+    from sdimu_calibration.core.advice import Kind
+
+    if goals is None:
+        return summary
+    about_turns = {Kind.SIGNED_TURNS, Kind.TWO_RATES}
+    return replace(summary, advice=tuple(one for one in summary.advice if one.kind not in about_turns))
 
 
 def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:

@@ -159,7 +159,7 @@ def _known(kind: str) -> list[str]:
 def _file_in(folder: Path, kind: str) -> str:
     """Say which file of a folder is meant: the only one that it may be, else that it is a YAML file."""
     files = sorted(p for p in folder.glob("*") if p.suffix in _SUFFIXES)
-    return f"the {kind} file in it ({files[0]})" if len(files) == 1 else f"a {kind} file (YAML)"
+    return f"the {kind} file in it ({files[0]})" if len(files) == 1 else f"a YAML file of kind {kind}"
 
 
 def _is_path(text: str) -> bool:
