@@ -123,7 +123,7 @@ def in_metres(values: Sequence[float]) -> str:
 
 def metres(value: float) -> str:
     """Write a distance (m): ``55 m``, ``3.2 km``."""
-    return f"{value / _KILOMETRE:.2g} km" if value >= _KILOMETRE else f"{_number(value)} m"
+    return f"{_number(value / _KILOMETRE)} km" if value >= _KILOMETRE else f"{_number(value)} m"
 
 
 def _number(value: float) -> str:

@@ -56,7 +56,7 @@ def deviates(
         Pixels.
     """
     numbered = len(columns) <= _MOST_NUMBERED
-    text = [[cell(v) if numbered else _sign(v) for v in row] for row in value]
+    text = [[cell(v) if numbered else sign(v) for v in row] for row in value]
     figure = Figure()
     figure.add(
         "heatmap",
@@ -89,7 +89,7 @@ def cell(value: float) -> str:
     return shown.replace("-", "\N{MINUS SIGN}")
 
 
-def _sign(value: float) -> str:
+def sign(value: float) -> str:
     """Write a cell where there is room for one character: the sign of what stands out."""
     if not abs(value) > data.NOTABLE:
         return ""

@@ -20,12 +20,14 @@ from sdimu_sim.cli.options import SeedOption, World
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_calibration.cli.processes import Children
+    from sdimu_calibration.cli.processes import Children, RunningTest
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
+START_NS = 1_700_000_000_000_000_000
+"""Stamp of the begin of a simulated test (ns): the same in every run, so that runs of one seed are the same."""
 DEFAULT_PLAN = "kim18"
 DEFAULT_MODEL = "baseline"
 
@@ -85,7 +87,8 @@ def run(
     console = make_console()
     with own_folder(out):
         begun = time.monotonic()
-        with own_domain(out / "log", domain) as used, Children(out / "log") as children:
+        about = _about(options, test, duration, out)
+        with own_domain(out / "log", domain, about) as used, Children(out / "log") as children:
             _clear(out, test.followed, replace)
             console.print(f"ROS domain {used}", highlight=False)
             if never_compiled():
@@ -100,11 +103,21 @@ def run(
     _leave(result, test.adaptive, end)
 
 
+def _about(options: dict[str, dict[str, Any]], test: LiveTest, duration: float, out: Path) -> RunningTest:
+    """Say what is run to those that watch it (`sdimu watch`)."""
+    from sdimu_calibration.cli.processes import RunningTest
+    from sdimu_calibration.storage.files.config import load_plan
+
+    stops = 0 if test.adaptive else len(load_plan(test.followed).dwell_s)
+    start_ns = int(options["table"]["start_ns"])
+    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns)
+
+
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:
     """Parameters of table, IMU and calibration node."""
     plan = test.followed
     return {
-        "table": {"plan": plan, "table": world.table, "seed": test.seed, "speed": test.speed},
+        "table": {"plan": plan, "table": world.table, "seed": test.seed, "speed": test.speed, "start_ns": START_NS},
         "imu": {
             "imu": test.imu,
             "site": world.site,
