@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
-from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
+from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
 from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, single
@@ -65,6 +65,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.storage.trace import traced
 
     console, asked = plain(stderr=request.as_json), request.asked_estimator
+    printed = printing(console, request.pdf)
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
     if request.bootstrap and asked == HANDHELD:
@@ -96,6 +97,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     with bar(console):
         trace = traced([bag], sys.argv[1:], site=opening.site, imu=opening.imu, model=request.model)
         _write(Findings(about, f"Diagnosis of {bag.name}", summary, more, null), trace)
+    printed(folder / "report.html")
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", request.as_json)

@@ -126,8 +126,11 @@ def _entered(domain: int | None) -> int:
 
 def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]) -> tuple[Outline, dict[str, float]]:
     """Outline of a test, and sigmas (SI) at its begin by coefficient: those of the IMU's file, where it is known."""
+    import numpy as np
+
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
+    from sdimu_calibration.core.effects.body_frame import frame_jacobian
     from sdimu_calibration.core.effects.imu_model import prior_size
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.effect_file import extended_model
@@ -139,8 +142,10 @@ def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     if test is None:
         return Outline(0.0, 0, keys, units), {}
     imu = load_imu(test.imu)
-    sizes = {q.name: prior_size(effect, imu) for effect in effects for q in effect.parameters}
-    first = {name: size for name, size in sizes.items() if size is not None}
+    size = np.array([prior_size(effect, imu) or 0.0 for effect in effects for _ in effect.parameters])
+    # Published sigmas are those in the body frame, to which misalignments of both triads add up.
+    J = frame_jacobian(list(units), chosen.body_frame)
+    first = dict(zip(units, np.sqrt((J**2) @ size**2).tolist(), strict=True))
     return Outline(test.duration_s, test.stops, keys, units), first
 
 

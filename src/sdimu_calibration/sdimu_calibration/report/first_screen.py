@@ -24,6 +24,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.cost import Off, coefficients_off, in_use, wrong_without
 from sdimu_calibration.report.effect_words import tip
+from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.ladder_strip import ladder_strip
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.report_extras import ReportExtras
@@ -228,6 +229,7 @@ def render(first: FirstScreen, *pictures: str) -> str:
         f'<li><span class="figure-number">{escape(number)}</span><span>{words}</span></li>'
         for number, words in first.costs
     )
+    what = f'{first.ladder}<ul class="numbers">{costs}</ul>'
     shown = "".join(f"<li>{text}</li>" for text in first.advice[:_WORST])
     rest = "".join(f"<li>{text}</li>" for text in first.advice[_WORST:])
     more = f"<details><summary>{len(first.advice) - _WORST} more</summary><ul>{rest}</ul></details>" if rest else ""
@@ -237,7 +239,7 @@ def render(first: FirstScreen, *pictures: str) -> str:
         f'<span class="tag">{first.tag or _WORDS[first.tone]}</span> {first.head}</p>'
         f"{''.join(f'<p>{text}</p>' for text in first.remarks)}</div>"
         f'<div class="columns"><section class="card"><h2>{first.cost_title}</h2>'
-        f'{first.ladder}<ul class="numbers">{costs}</ul></section>'
+        f"{explained(what)}</section>"
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'
         f'<div class="pictures">{"".join(picture for picture in pictures if picture)}</div></section>'
     )

@@ -164,16 +164,23 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
         *fits,
         folded(
             "Every candidate, added alone",
-            draw(evidence_figures.ranking(entries, d.found.threshold)),
+            draw(evidence_figures.ranking(entries, d.found.threshold, classes_of(summary.found))),
             quiet(
                 "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
-                "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect."
+                "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect; "
+                "below it stands what looks the same, each with its probability."
             ),
         ),
         folded("Steps of the search", ladder(d)),
         folded("Ladder of refits: one effect at a time", refits(d.rungs)) if d.rungs else "",
         quiet(numbers(d)),
     )
+
+
+def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
+    """Say what each effect that was found may be, itself first, each with its probability in words."""
+    named = {one.candidate.label: {share.name: in_percent(share.probability) for share in one.may_be} for one in found}
+    return {label: shares for label, shares in named.items() if len(shares) > 1}
 
 
 _FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor", "held-out error")
