@@ -8,10 +8,11 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
-from sdimu_calibration.core.posterior.told import Share
+from sdimu_calibration.core.posterior.family import family_of
+from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import first_screen
-from sdimu_calibration.storage.files.verdict_words import headline, named, size_of
+from sdimu_calibration.storage.files.verdict_words import _grade, headline, named, size_of
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +77,27 @@ def test_green_needs_an_error_near_one(summary):
         after = replace(clean.after, fit={**clean.after.fit, "held_out_rms": error}, warnings=())
         told = replace(summary, found=(), diagnosis=replace(clean, before=after, after=after))
         assert first_screen.of_diagnosis(told).tone == tone
+
+
+def test_a_family_surer_than_the_class_is_told_with_its_members_each_once_by_one_figure(summary):
+    (one,) = summary.found
+    family, sensor = family_of(one.candidate)
+    members = [
+        MemberShare(label, p, 1.0, 0.1, "1", "ppm")
+        for label, p in (
+            (one.candidate.label, 0.5),
+            ("accel_cubic_x", 0.1),
+            ("accel_scale_x(tau=1 s)", 0.15),
+            ("accel_scale_x(tau=2 s)", 0.15),
+        )
+    ]
+    told = Probabilities(0.0, (FamilyShare(family, sensor, 0.97, tuple(members)),), ())
+    shares = (Share(own(summary), 0.5), Share("accel_scale_x", 0.28))
+    found = replace(one, probability=0.6, of_family=0.97, may_be=shares)
+    graded_ = _grade(found, told)
+    assert graded_.probability == 0.97
+    assert [(s.name, s.probability) for s in graded_.may_be] == [
+        (own(summary), 0.5),
+        ("accel_scale_x", 0.28),
+        ("accel_cubic_x", 0.1),
+    ]

@@ -10,7 +10,7 @@ WORDS = {
         "RMS of measurement minus prediction over its sigma, at stops that the fit did not see. 1: the model is right "
         "to its noise; more: something is missing"
     ),
-    "NIS": "normalised innovation squared: mean of (measurement minus prediction) squared over its variance; 1 is right",
+    "NIS": "mean of the squared difference of measurement and prediction over its variance; 1 is right",
     "sigmas": "standard deviations: of a right model two of three values are within one, 99.7 % within three",
     "without aid": "navigation by this IMU alone after levelling at rest: nothing from outside tells where it is",
 }

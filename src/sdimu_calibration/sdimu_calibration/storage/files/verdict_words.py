@@ -69,8 +69,11 @@ def _grade(one: Found, told: Probabilities | None) -> Graded:
     for member in family.members if family else ():
         name = member.label.partition("(")[0]
         members[name] = members.get(name, 0.0) + member.probability
-    named = tuple(Share(name, min(p, 1.0)) for name, p in members.items() if p >= NAMED)
-    return Graded(one, one.of_family, named or shares)
+    known = {share.name: share.probability for share in one.may_be}
+    # Models may hold two time constants of one effect: where the class knows it, the sum counts them once.
+    every = sorted(((known.get(name, min(p, 1.0)), name) for name, p in members.items()), key=lambda item: -item[0])
+    listed = tuple(Share(name, p) for p, name in every if p >= NAMED)
+    return Graded(one, one.of_family, listed or shares)
 
 
 def headline(summary: DiagnosisSummary) -> str:
