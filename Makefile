@@ -40,7 +40,7 @@ $(BOOK): $(STAMP) requirements/docs.lock
 
 # A whole simulated test over DDS, from the table to report.html.
 demo: $(RUN)
-	$(BIN)/sdimu run --out $(OUT)
+	$(BIN)/sdimu run --replace --out $(OUT)
 
 # Style, types and the direction of imports.
 check: setup

@@ -14,7 +14,7 @@ numba.config.DISABLE_JIT = True
 
 project = "sdimu-calibration"
 author = "the sdimu-calibration maintainers"
-copyright = "Apache-2.0"  # noqa: A001 (the name is Sphinx's)
+copyright = "the sdimu-calibration maintainers, licence Apache-2.0"  # noqa: A001 (the name is Sphinx's)
 release = metadata.version("sdimu-calibration")
 
 extensions = [

@@ -214,7 +214,7 @@ def summarise(
     checks = [
         statistics.bias_check(found, n),
         *statistics.sigma_checks(found, n),
-        statistics.bound_check(found),
+        statistics.bound_check(found, n),
         statistics.nees_check(nees, p),
         statistics.nis_check(nis.sum(axis=1), dof.sum(axis=1)),
         statistics.lag_check(lag1, counts, CHANNELS),

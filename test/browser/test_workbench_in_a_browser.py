@@ -256,7 +256,10 @@ def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command
     assert begin == pytest.approx(times[10] - 1.0, abs=0.01)
     assert end == pytest.approx(times[19], abs=0.01)
 
-    choose(page, "coefficient", "gyro_bias_x")
+    # A click on a row puts estimate, sigma and unit into the controls.
+    page.locator("#coefficients tr[data-coefficient=gyro_bias_x] button").click()
+    page.wait_for_function("document.getElementById('mean').value.endsWith(' deg/h')")
+    assert page.locator("#sigma").input_value().endswith(" deg/h")
     page.locator("#mean").fill("0.2 deg/h")
     page.locator("#mean").blur()
     page.locator("#fix").click()

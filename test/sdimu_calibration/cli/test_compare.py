@@ -67,7 +67,7 @@ def test_the_ladder_shows_what_was_added_and_how_far_the_error_fell(run):
     status, out, _ = run(FIRST, SECOND)
     assert status == 0
     line = next(text for text in out.splitlines() if "run1" in text)
-    for word in ("+ accel_quadratic_x", "+60.0", "1.000", "accel_bias_x +5.0"):
+    for word in ("+ accel_quadratic_x", "+60.0", "1.000", "(5.0 of its sigmas)"):
         assert word in line
     assert "accel_bias_y" not in line  # moved by one sigma only
 

@@ -73,7 +73,7 @@ def test_a_coefficient_that_is_another_one_is_told_by_a_diagnosis(sdimu, hidden,
 def test_the_loop_of_diagnosis_addition_and_comparison(sdimu, hidden, tmp_path):
     status, out, err = sdimu("diagnose", hidden, "--out", tmp_path / "d")
     assert (status, err) == (0, "")
-    assert out.splitlines()[0].startswith(("One effect is missing", "Several effects"))
+    assert out.splitlines()[0].startswith("Certain")
     assert "accel_quadratic_y" in out
     assert "could not have been seen" in out
     found = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
@@ -132,7 +132,7 @@ def test_a_run_by_hand_is_diagnosed_by_its_own_fit(sdimu, tmp_path):
     status, out, err = sdimu("diagnose", bag, "--imu", "mems_by_hand", "--out", tmp_path / "d")
     assert (status, err) == (0, "")
     assert "nothing is navigated" in out
-    assert "One effect is missing" in out
+    assert out.startswith(("Certain", "Likely"))
     found = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
     (one,) = found["candidates"]
     assert "accel_quadratic_x" in {one["label"], *one["indistinguishable_from"]}

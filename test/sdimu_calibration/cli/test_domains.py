@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from sdimu_calibration.cli.processes import DOMAINS, own_domain
+from sdimu_calibration.cli.processes import DOMAINS, RunningTest, is_held, own_domain, running_tests
+from sdimu_calibration.cli.watch_verb import Pace, _outline, watched
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
 
 
 @pytest.fixture(autouse=True)
@@ -47,3 +51,50 @@ def test_what_is_no_domain_is_refused(tmp_path, monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(DataError, match="expected 0 to 232"), own_domain(tmp_path):
         pytest.fail("that is no domain")
+
+
+ABOUT = RunningTest("/out/run", 900.0, 19, "baseline", "dtg", 1_700_000_000 * 10**9)
+
+
+def test_a_run_tells_those_that_watch_it_where_it_is_and_what_it_makes(tmp_path, monkeypatch):
+    with own_domain(tmp_path, 31, ABOUT), own_domain(tmp_path, 32):
+        monkeypatch.delenv("ROS_DOMAIN_ID")  # the shell of one that watches
+        assert running_tests() == (replace(ABOUT, domain=31),)
+        assert watched(None) == replace(ABOUT, domain=31)
+        assert watched(31) == replace(ABOUT, domain=31)
+        assert watched(32) is None  # nodes without a run say nothing of their test
+        assert is_held(31)
+    assert running_tests() == ()
+    assert not is_held(31)
+    assert watched(None) is None
+
+
+def test_of_several_runs_one_must_be_stated(tmp_path, monkeypatch):
+    with own_domain(tmp_path, 31, ABOUT), own_domain(tmp_path, 34, ABOUT):
+        monkeypatch.delenv("ROS_DOMAIN_ID")
+        with pytest.raises(DataError, match=r"2 tests run on this machine; state one: --domain 31 .*--domain 34"):
+            watched(None)
+        assert watched(34) == replace(ABOUT, domain=34)
+
+
+def test_a_file_that_says_nothing_of_use_is_no_test(tmp_path):
+    with own_domain(tmp_path, 31, ABOUT):
+        for text in ("", "[]", '{"folder": 1}', "no json"):
+            (tmp_path / "sdimu-domain-31.lock").write_text(text)
+            assert running_tests() == ()
+
+
+def test_the_time_that_is_left_follows_from_the_pace_since_it_is_watched():
+    """Joined 600 s into a test that runs at 10 times real time: it has taken 61 s after another second."""
+    pace = Pace()
+    assert pace.wall(0.0, 5.0) == 0.0
+    assert pace.wall(600.0, 7.0) == 0.0
+    assert pace.wall(610.0, 8.0) == pytest.approx(61.0)
+
+
+def test_sigmas_at_the_begin_are_those_that_the_node_publishes_first():
+    """In the body frame misalignments of the two triads add up: 1 arcmin of each are 1.4 there."""
+    _, first = _outline(ABOUT, None, ())
+    assert first["gyro_bias_x"] == pytest.approx(to_si(1.0, "deg/h"))
+    assert first["gyro_misalignment_xy"] == pytest.approx(np.sqrt(2.0) * to_si(1.0, "arcmin"))
+    assert _outline(None, None, ())[1] == {}

@@ -182,7 +182,7 @@ def test_advice_repeats_what_was_asked_for():
     asked = Asked.of((Path("a bag"),), Path("out"), StatedOpening("my site.yaml", "dtg", gyro_sign=-1), request)
     kept = Advice(Kind.KEEP, ("lever",), Verb.ADD, ("coupling.yaml:k1", "x(tau=3 s)"))
     command = spelled(kept, asked)
-    assert sentence(kept) == "Keep lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
+    assert sentence(kept) == "Calibrate with lever in the model: --add 'coupling.yaml:k1' --add 'x(tau=3 s)'."
     assert shlex.split(command) == [
         "sdimu",
         "calibrate",

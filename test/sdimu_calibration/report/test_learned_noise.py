@@ -73,9 +73,9 @@ def test_the_first_screen_of_a_fit_does_so_too(learned):
 
 
 def test_a_page_without_learned_noise_says_nothing_of_white_noise(diagnosis):
-    costs = first_screen.of_diagnosis(summarise(diagnosis)).costs
-    assert right_at_one(costs)
-    assert not any("white noise" in words for _, words in costs)
+    first = first_screen.of_diagnosis(summarise(diagnosis))
+    assert "1 is right" in first.ladder
+    assert not any("white noise" in words for words in (first.ladder, *(words for _, words in first.costs)))
     assert "in white noise" not in error_falls(diagnosis)
 
 

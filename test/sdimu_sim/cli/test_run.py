@@ -1,14 +1,17 @@
 """The verb run: what it refuses, and that a refused run leaves everything as it was."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from sdimu_calibration.cli.processes import own_domain, own_folder
+from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_plan
-from sdimu_sim.cli.run import LiveTest, _clear, _write_plan, run
+from sdimu_sim.cli.run import LiveTest, _clear, _write_plan, run, without_scolding
 
 
 @pytest.fixture
@@ -85,5 +88,30 @@ def test_results_of_an_earlier_run_are_removed_once_nothing_refuses(tmp_path):
     (tmp_path / "log").mkdir()
     for name in ("log/rate_table.yaml", "result.json", "report.html", "kept"):
         (tmp_path / name).touch()
-    assert _clear(tmp_path)
+    _clear(tmp_path)
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["kept", "log"]
+
+
+def test_a_run_into_the_folder_of_an_earlier_one_asks_for_replace(tmp_path):
+    (tmp_path / "log").mkdir()
+    (tmp_path / "bag").mkdir()
+    for name in ("log/rate_table.yaml", "bag/metadata.yaml", "result.json"):
+        (tmp_path / name).touch()
+    with pytest.raises(DataError, match="--replace"):
+        _clear(tmp_path)
+    assert (tmp_path / "result.json").exists()
+    _clear(tmp_path, replace=True)
+    assert not (tmp_path / "result.json").exists()
+
+
+def test_turns_that_the_test_chose_itself_are_not_scolded():
+    @dataclass(frozen=True)
+    class Summary:
+        advice: tuple[Advice, ...]
+
+    kept = Advice(Kind.REPEAT_STOPS)
+    told = Summary(
+        (Advice(Kind.SIGNED_TURNS, ("all turns are positive",)), kept, Advice(Kind.TWO_RATES, ("one rate",)))
+    )
+    assert without_scolding(told, "table33").advice == (kept,)
+    assert without_scolding(told, None) == told

@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
+from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -27,6 +28,7 @@ from sdimu_calibration.report.unknown_section import followed, unknown_of
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
+from sdimu_calibration.storage.files.verdict_words import headline
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
 
@@ -40,8 +42,8 @@ class FitDiagnosis:
         With the evidence and both fits.
     """
 
-    def __init__(self, core: Diagnosis) -> None:
-        self.core = core
+    def __init__(self, core: Diagnosis, delivered: Fit | None = None) -> None:
+        self.core, self._delivered = core, delivered
 
     @cached_property
     def summary(self) -> DiagnosisSummary:
@@ -52,6 +54,11 @@ class FitDiagnosis:
     def verdict(self) -> str:
         """The verdict in a word or two."""
         return self.core.verdict.value
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence: what is certain, what is likely, what is open."""
+        return headline(self.summary)
 
     @property
     def adequate(self) -> bool:
@@ -67,7 +74,7 @@ class FitDiagnosis:
     def best(self) -> Candidate:
         """The effect that explains most, for `CalibrationFit.add`."""
         if not self.found:
-            raise DataError(f"nothing was found: {self.core.sentence}")
+            raise DataError(f"nothing was found: {self.sentence}")
         return self.found[0].candidate
 
     @cached_property
@@ -129,7 +136,7 @@ class FitDiagnosis:
                 self.core.after,
                 title="Diagnosis",
                 summary=self.summary,
-                more=report_extras(self.core),
+                more=report_extras(self.core, self._delivered),
                 trace=traced(),
             )
         return folder
@@ -140,9 +147,9 @@ class FitDiagnosis:
 
     def __repr__(self) -> str:
         """Sentence and advice."""
-        return "\n".join([f"{self.verdict}: {self.core.sentence}", *self._told()])
+        return "\n".join([f"{self.verdict}: {self.sentence}", *self._told()])
 
     def _repr_html_(self) -> str:
         """Sentence and advice as HTML."""
         listed = "".join(f"<li>{escape(text)}</li>" for text in self._told())
-        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.core.sentence)}</p><ul>{listed}</ul>"
+        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.sentence)}</p><ul>{listed}</ul>"

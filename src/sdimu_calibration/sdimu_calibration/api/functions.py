@@ -208,7 +208,7 @@ def diagnose(
             raise DataError("diagnose(refits=True): is of one recording: leave it out for a set")
         return fit.of.diagnose(fit, extra, progress)
     _expect("diagnose", "fit", fit, CalibrationFit, "what calibrate(...) returns")
-    return FitDiagnosis(climb(fit.core, extra, progress, refits=refits))
+    return FitDiagnosis(climb(fit.core, extra, progress, refits=refits), fit.core)
 
 
 def compare(*fits: CalibrationFit) -> Comparison:

@@ -12,7 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.next_commands import Asked, spelled
-from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
+from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
@@ -45,6 +45,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     from sdimu_calibration.storage.trace import traced
 
     console, truth = plain(stderr=request.as_json), request.truth
+    printed = printing(console, request.pdf)
     if truth is not None and request.estimator == "classical":
         raise typer.BadParameter(
             "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
@@ -79,6 +80,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
             trace=trace,
             spell=partial(spelled, asked=about),
         )
+    printed(folder / "report.html")
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     at = relative_line(result.references)
     tell(console, (*((at,) if at else ()), *notes, *(note for note in result.notes if note not in notes)))

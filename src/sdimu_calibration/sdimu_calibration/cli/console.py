@@ -25,11 +25,34 @@ def plain(**options: Any) -> Console:
 
 
 def say(console: Console, text: str) -> None:
-    """Print a line: wrapped between words in a terminal, whole in a pipe, so that it can be searched."""
-    line = one_line(text, None)
+    """Print a line: wrapped between words in a terminal, whole in a pipe, so that it can be searched.
+
+    Spaces before the first word stay: they say that the line belongs to the one above.
+    """
+    indent = " " * (len(text) - len(text.lstrip(" ")))
+    line = indent + one_line(text, None)
     if console.is_terminal:
         line = textwrap.fill(
-            line, console.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+            line, console.width, subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False
+        )
+    console.print(line, soft_wrap=True, highlight=False)
+
+
+def pair(console: Console, name: str, text: str, width: int) -> None:
+    """Print a name and what is said of it, below the names and texts of other pairs.
+
+    Parameters
+    ----------
+    console : Console
+    name, text : str
+    width : int
+        Characters of the longest name.
+    """
+    before = f"  {one_line(name, None):{width}}  "
+    line = before + one_line(text, None)
+    if console.is_terminal:
+        line = textwrap.fill(
+            line, console.width, subsequent_indent=" " * len(before), break_long_words=False, break_on_hyphens=False
         )
     console.print(line, soft_wrap=True, highlight=False)
 

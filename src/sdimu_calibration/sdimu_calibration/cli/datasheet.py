@@ -10,8 +10,9 @@ import typer
 
 import sdimu_calibration
 from sdimu_calibration.cli.console import answer, plain, say
+from sdimu_calibration.cli.opened import printing
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import FoldersArgument, JsonOption, results_in
+from sdimu_calibration.cli.options import FoldersArgument, JsonOption, PdfOption, results_in
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -48,6 +49,7 @@ def datasheet(
     *,
     certified: Certified,
     out: Annotated[Path | None, results_in("pages; FOLDER")] = None,
+    pdf: PdfOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make a data sheet from results; leaves datasheet.json and datasheet.html (prints on A4)."""
@@ -61,6 +63,7 @@ def datasheet(
     from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
 
     console = plain(stderr=as_json)
+    printed = printing(console, pdf)
     allowed = {} if limits is None else read_limits(limits, core.known_terms())
     rests = [read_noise_terms(path) for path in noise or _noise_below(folders)]
     gathered = gather(folders, one_model=False)
@@ -85,6 +88,7 @@ def datasheet(
     for name, digest in about.recordings:
         if not digest:
             say(console, f"note: {name} was not found, so it has no hash: --recording BAG")
+    printed(folder / "datasheet.html")
     say(console, f"datasheet.json and datasheet.html in {folder}")
     answer(folder / "datasheet.json", as_json)
 

@@ -12,7 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, spelled
-from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, tell
+from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
 from sdimu_calibration.cli.progress import bar
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sdimu_calibration.cli.next_commands import Asked
     from sdimu_calibration.core.diagnosis.bootstrap import Null
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-    from sdimu_calibration.core.progress import Progress
+    from sdimu_calibration.report.report_extras import ReportExtras
     from sdimu_calibration.storage.trace import Trace
 
 NO_BOOTSTRAP = "--bootstrap: a handheld run learns its scatter, so there is no noise to draw; leave it out"
@@ -59,11 +59,14 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.files.effect_file import find_effects
     from sdimu_calibration.storage.files.model_choice import HANDHELD
+    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.trace import traced
 
     console, asked = plain(stderr=request.as_json), request.asked_estimator
+    printed = printing(console, request.pdf)
     if asked == "classical":
         raise DataError(NOT_DIAGNOSABLE)
     if request.bootstrap and asked == HANDHELD:
@@ -79,49 +82,71 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         raise DataError(NO_BOOTSTRAP)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
-        found = climb(solve(test, wanted, chosen, progress=progress), extra, progress, refits=request.grow)
+        fit = solve(test, wanted, chosen, progress=progress)
+        found = climb(fit, extra, progress, refits=request.grow)
+        progress("navigation without aid", 0.97)
+        more = report_extras(found, fit)
     summary = summarise(found)
     folder = request.out or default_folder(bag, "diagnosis")
     about = Asked.of((bag,), folder, opening, request)
-    print_summary(console, summary, about)
+    print_summary(console, summary, about, more)
     null = None
     if request.bootstrap:
         with bar(console) as progress:
             null = repeat_on_noise(found, request.bootstrap, progress=progress)
         say(console, f"bootstrap: {null.sentence}")
-    with bar(console) as progress:
+    with bar(console):
         trace = traced([bag], sys.argv[1:], site=opening.site, imu=opening.imu, model=request.model)
-        _write(about, f"Diagnosis of {bag.name}", summary, null, progress, trace)
+        _write(Findings(about, f"Diagnosis of {bag.name}", summary, more, null), trace)
+    printed(folder / "report.html")
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", request.as_json)
-    leave(found.after, (found.verdict, found.sentence))
+    leave(found.after, (found.verdict, headline(summary)))
 
 
-def _write(
-    about: Asked, title: str, summary: DiagnosisSummary, null: Null | None, progress: Progress, trace: Trace
-) -> None:
+@dataclass(frozen=True)
+class Findings:
+    """What a diagnosis leaves, and where.
+
+    Attributes
+    ----------
+    about : Asked
+    title : str
+        Of the page.
+    summary : DiagnosisSummary
+    more : ReportExtras
+    null : Null or None
+        Of a bootstrap.
+    """
+
+    about: Asked
+    title: str
+    summary: DiagnosisSummary
+    more: ReportExtras
+    null: Null | None
+
+
+def _write(what: Findings, trace: Trace) -> None:
     """Leave diagnosis.json, result.json and report.html."""
     from sdimu_calibration.report.page import write_report
-    from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.files.plan_file import write_plan
     from sdimu_calibration.storage.files.result_file import write_result
 
+    summary = what.summary
     found = summary.diagnosis
-    with written_together(about.folder) as part:
-        write_diagnosis(part / "diagnosis.json", summary, null)
+    with written_together(what.about.folder) as part:
+        write_diagnosis(part / "diagnosis.json", summary, what.null)
         write_result(part / "result.json", found.after, found.verdict)
         if (plan := as_plan(summary.plan)) is not None:
             write_plan(part / PLAN, plan, ["The plan as the motion showed it, for: sdimu plan --plan"])
-        progress("navigation without aid", 0.5)
-        more = report_extras(found)
         write_report(
             part / "report.html",
             found.after,
-            title=title,
+            title=what.title,
             summary=summary,
-            more=more,
+            more=what.more,
             trace=trace,
-            spell=partial(spelled, asked=about),
+            spell=partial(spelled, asked=what.about),
         )

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
-from sdimu_calibration.core.diagnosis.verdict import beyond
+from sdimu_calibration.core.diagnosis.verdict import beyond, error_falls
+from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
+from sdimu_calibration.report.cost import in_use, wrong_without
+from sdimu_calibration.storage.files.verdict_words import NAMED, headline
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,30 +28,62 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.ladder import Rung
     from sdimu_calibration.core.diagnosis.step import Step
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+    from sdimu_calibration.core.posterior.told import Probabilities
+    from sdimu_calibration.report.report_extras import ReportExtras
 
 _TOP = 5
+_WORST = 4
+"""Number of coefficients that are named as wrong: the page has the rest."""
+_WHOLE = 100.0
+"""Number from which a size has no decimals: two digits of it would be written with an exponent."""
+_EACH = 4
+"""Number of families of which the smallest size is told, of gyros and of accelerometers each."""
 POSSIBLE = 0.1
 """Probability (1) from which something that is not told is listed as possible: less is one of many."""
 
 
-def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked) -> None:
+def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, more: ReportExtras | None = None) -> None:
     """Print everything that a diagnosis has to say; its advice as commands for what was asked."""
     d = summary.diagnosis
-    line(console, d.sentence)
+    said = headline(summary)
+    line(console, said)
+    for text in cost_lines(summary, more):
+        line(console, text)
     for finding in d.findings:
         line(console, f"data: {finding.text}")
     for text in d.noise:
-        line(console, f"noise: {text}")
-    noise = " in white noise" if d.found.noise else ""
-    line(console, f"p of the model as given{noise}: {f'{d.p_value:.2g}' if d.p_value > 1e-300 else 'below 1e-300'}")
+        if text not in said:
+            line(console, f"noise: {text}")
     _where(console, summary)
     _candidates(console, summary)
     _possible(console, summary)
+    if summary.found:
+        line(console, held_out_line(d))
     for text in step_lines(d.found.steps):
         line(console, text)
     print_ladder(console, d.rungs)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
+
+
+def cost_lines(summary: DiagnosisSummary, more: ReportExtras | None) -> list[str]:
+    """Say what a missing effect costs: metres without aid, then the coefficients that are wrong without it."""
+    use = in_use(more)
+    lines = [] if use is None else [f"{use.figures}: {use.words}"]
+    off = wrong_without(summary, more)
+    if off:
+        rest = f" and {len(off) - _WORST} more" if len(off) > _WORST else ""
+        lines.append(f"wrong without it: {', '.join(one.text for one in off[:_WORST])}{rest}")
+    return lines
+
+
+def held_out_line(d: Diagnosis) -> str:
+    """Say how far the error falls where the fit has not seen the data."""
+    if d.fit.learns_scatter:
+        return error_falls(d)
+    white = " in white noise" if noise_learned(d.after) else ""
+    falls = f"{held_out(d.before):.3f} -> {held_out(d.after):.3f}"
+    return f"held-out error{white}, at stops that the fit has not seen: {falls}"
 
 
 def notes_of_diagnosis(d: Diagnosis) -> tuple[str, ...]:
@@ -85,32 +121,50 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
     shown = summary.candidates or summary.found
     if not shown:
         return
-    lines = []
-    for f in shown:
-        unit = f.candidate.parameter.display_unit
-        lines.append(
-            [
-                f.candidate.label,
-                amount(f.value, unit, 4),
-                amount(f.sigma, unit, 2),
-                unit,
-                in_percent(f.probability) if f.probability == f.probability else "",
-                f"{f.z:+.1f}",
-                f"{100 * f.explained:.0f} %",
-            ]
-        )
-    headings = ("effect", "estimate", "+-", "unit", "probability", "z", "explains")
+    lines = [row for one in shown for row in candidate_rows(one, summary.diagnosis.probabilities)]
     title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
-    print_table(console, headings, lines, title)
+    print_table(console, CANDIDATE_HEADINGS, lines, title)
     for f in shown:
-        alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike else ""
-        if len(f.may_be) > 1:
-            alike = f"may be {', '.join(f'{s.name} {in_percent(s.probability)}' for s in f.may_be[:_TOP])}"
+        alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike and len(f.may_be) < 2 else ""
         pairs = [f"{one} with {other} ({in_percent(p)})" for one, other, p in f.together[:_TOP]]
         same = f"the same by two effects together: {', '.join(pairs)}" if pairs else ""
-        words = "; ".join(part for part in (_fall(f), alike, same) if part)
+        fall = _fall(f) if len(shown) > 1 else ""
+        words = "; ".join(part for part in (fall, alike, same) if part)
         if words:
             line(console, f"{f.candidate.label}: {words}")
+
+
+CANDIDATE_HEADINGS = ("effect", "estimate", "+-", "unit", "probability", "z")
+
+
+def candidate_rows(f: Found, told: Probabilities | None) -> list[list[str]]:
+    """Rows of an effect that was found, and of what it may be instead: each with the probability that it is this one.
+
+    Parameters
+    ----------
+    f : Found
+    told : Probabilities or None
+        Where the sizes stand of what it may be instead.
+    """
+    own = f.candidate.coefficient
+    shares = {share.name: share.probability for share in f.may_be}
+    p = shares.get(own, f.probability)
+    unit = f.candidate.parameter.display_unit
+    size = [amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit]
+    rows = [[f.candidate.label, *size, in_percent(p) if isfinite(p) else "", f"{f.z:+.1f}"]]
+    others = [share for share in f.may_be[:_TOP] if share.name != own and share.probability >= NAMED]
+    more = [[f"  or {one.name}", *_size_of(one.name, told), in_percent(one.probability), ""] for one in others]
+    return rows + more
+
+
+def _size_of(name: str, told: Probabilities | None) -> list[str]:
+    """Size, sigma and unit of the likeliest member of that name; empty texts where nothing is told of it."""
+    members = [m for family in told.families for m in family.members] if told is not None else []
+    of_name = [m for m in members if m.label.partition("(")[0] == name and isfinite(m.value)]
+    if not of_name:
+        return ["", "", ""]
+    m = max(of_name, key=lambda one: one.probability)
+    return [amount(m.value, m.display_unit, 4), amount(m.sigma, m.display_unit, 2), m.display_unit]
 
 
 def _possible(console: Console, summary: DiagnosisSummary) -> None:
@@ -143,17 +197,12 @@ def _fall(f: Found) -> str:
 
 
 def step_lines(steps: Sequence[Step]) -> list[str]:
-    """Say of each effect what it adds to those before it, and which coefficients were wrong without it."""
-    lines: list[str] = []
-    for number, s in enumerate(steps, start=1):
-        lines.append(
-            f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, log Bayes factor "
-            f"{s.log_bayes_factor:.0f}; log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f})"
-        )
-        moved = ", ".join(f"{name} {size:+.1f} sigma" for name, size in s.moved if abs(size) > 1.0)
-        if moved:
-            lines.append(f"  without it these were wrong: {moved}")
-    return lines
+    """Say of each effect what it adds to those before it."""
+    return [
+        f"step {number}: {s.label} (z {s.z:+.1f}, threshold {s.threshold:.1f}, log Bayes factor "
+        f"{s.log_bayes_factor:.0f}; log score of stops left out {s.held_out_gain:+.0f} +- {s.held_out_error:.0f})"
+        for number, s in enumerate(steps, start=1)
+    ]
 
 
 def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
@@ -164,7 +213,7 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
     for group in summary.untestable:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")
-    if summary.diagnosis.adequate:
+    if summary.reached:
         line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
 
 
@@ -174,16 +223,18 @@ def smallest(reached: tuple[DetectableSize, ...]) -> str:
 
 
 def _typical(reached: tuple[DetectableSize, ...]) -> list[DetectableSize]:
-    """One candidate of each of the first families: enough to see the scale of things."""
+    """One candidate of each of the first families of gyros and of accelerometers: enough to see the scale of things."""
     chosen: dict[str, DetectableSize] = {}
     for r in reached:
         if r.testable:
             chosen.setdefault(r.family, r)
-    return list(chosen.values())[:6]
+    triads = [[r for r in chosen.values() if r.family.startswith(triad)][:_EACH] for triad in ("gyro", "accel")]
+    return [r for triad in triads for r in triad]
 
 
 def _size(r: DetectableSize) -> str:
-    return f"{r.label} {amount(r.smallest, r.display_unit, 2)} {r.display_unit}"
+    size = from_si(r.smallest, r.display_unit)
+    return f"{r.label} {size:.{0 if size >= _WHOLE else 2}{'f' if size >= _WHOLE else 'g'}} {r.display_unit}"
 
 
 def print_ladder(console: Console, rungs: tuple[Rung, ...]) -> None:

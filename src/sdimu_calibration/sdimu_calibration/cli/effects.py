@@ -42,10 +42,13 @@ def effects(
 
 def _print_group(console: Console, title: str, found: list[Effect]) -> None:
     """Print effects of a group: name, coefficients and unit, and the equation below."""
+    from sdimu_calibration.core.plain_text import counted
+
     say(console, f"\n{title}".strip())
     for effect in found:
         units = ", ".join(dict.fromkeys(parameter.display_unit for parameter in effect.parameters))
-        say(console, f"  {effect.name:34} {len(effect.parameters):3}  {units}")
+        many = counted(len(effect.parameters), "coefficient")
+        say(console, f"  {effect.name}: {many} in {units}")
         say(console, f"    {effect.equation}")
 
 

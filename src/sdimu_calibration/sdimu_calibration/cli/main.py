@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -58,6 +58,12 @@ class Verbs(TyperGroup):
         """Names of the verbs in the order of work, then what other packages add."""
         there = {**_VERBS, **_added()}
         return [*(name for name in _PLACED if name in there), *(name for name in there if name not in _PLACED)]
+
+    def get_params(self, ctx: Any) -> Any:
+        """Options of `sdimu` itself, and its help."""
+        options = super().get_params(ctx)
+        _take_no_type(options)
+        return options
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""
@@ -160,6 +166,19 @@ def _unavailable(name: str, error: ImportError) -> Callable[[], None]:
     return verb
 
 
+def _take_no_type(options: Iterable[Any]) -> None:
+    for option in options:
+        if getattr(option, "is_flag", False) and option.metavar is None:
+            option.metavar = ""
+
+
+def _without_types_of_flags(command: Any) -> None:
+    """Keep help from naming a type beside an option that takes no value: typer writes ``--help <bool>``."""
+    _take_no_type((*command.params, command.get_help_option(typer.Context(command))))
+    for inner in getattr(command, "commands", {}).values():
+        _without_types_of_flags(inner)
+
+
 def _command(name: str, verb: Any) -> Any:
     """Make a click command of a function or of a typer application."""
     if not isinstance(verb, typer.Typer):
@@ -168,6 +187,7 @@ def _command(name: str, verb: Any) -> Any:
         verb = single
     command: Any = get_command(verb)
     command.name = name
+    _without_types_of_flags(command)
     command.rich_help_panel = next((panel for panel, verbs in _PANELS.items() if name in verbs.split()), _MORE)
     return command
 

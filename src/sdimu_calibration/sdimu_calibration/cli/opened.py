@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -104,6 +104,16 @@ def explained(console: Console, notes: Iterable[str]) -> Iterator[None]:
     except DataError:
         tell(console, notes)
         raise
+
+
+def printing(console: Console, asked: bool) -> Callable[[Path], None]:
+    """Return what prints a page as PDF where it is asked for; a browser that lacks is told before the work begins."""
+    if not asked:
+        return lambda _: None
+    from sdimu_calibration.report.pdf import browser, print_pdf
+
+    program = browser()
+    return lambda page: say(console, f"printed: {print_pdf(page, program)}")
 
 
 def default_folder(bag: Path, what: str = "calibration") -> Path:

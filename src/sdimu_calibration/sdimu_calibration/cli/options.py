@@ -45,6 +45,9 @@ SetOption = Annotated[
     typer.Option("--set", metavar="FILE", help="Set of recordings (sdimu set init).", rich_help_panel=_OF_SETS),
 ]
 ReplaceOption = Annotated[bool, typer.Option("--replace", help="Overwrite the bag if it exists.")]
+PdfOption = Annotated[
+    bool, typer.Option("--pdf", help="Also print the page beside it (needs Chromium, Chrome or Edge).")
+]
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the answer as JSON, as its file has it; words go to stderr.")
 ]
@@ -266,6 +269,7 @@ class FitRequest(Fitted):
         typer.Option(metavar="ADDRESS", help="dask scheduler that reads them instead.", rich_help_panel=_OF_SETS),
     ] = None
     out: Annotated[Path | None, results_in("results; BAG_calibration")] = None
+    pdf: PdfOption = False
     as_json: JsonOption = False
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import fcntl
+import json
 import os
 import signal
 import subprocess
@@ -12,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -25,12 +26,14 @@ from sdimu_calibration.storage.files.config import config_folder
 DOMAINS = range(1, 102)
 STATED = range(233)
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
+_LOCK = "sdimu-domain-"
+"""Begin of the name of the file that holds a domain, in the folder of temporary files."""
 POLITE_S = 5.0
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
 @contextmanager
-def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
+def own_domain(log: Path, domain: int | None = None, about: RunningTest | None = None) -> Iterator[int]:
     """Put this process, and the children it starts, into a ROS domain that no other run on this machine uses.
 
     Traffic stays on the loopback interface. The domain is held by a lock file until the end.
@@ -41,6 +44,8 @@ def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
         Folder of the nodes' logs.
     domain : int, optional
         The domain; left out, it is that of ``ROS_DOMAIN_ID``, and without it one that is free.
+    about : RunningTest, optional
+        What is run there, for those that watch it.
 
     Yields
     ------
@@ -49,20 +54,94 @@ def own_domain(log: Path, domain: int | None = None) -> Iterator[int]:
     """
     stated = domain if domain is not None else stated_domain()
     domain, lock = _free_domain() if stated is None else _stated_domain(stated)
+    if about is not None:
+        lock.truncate(0)
+        lock.write(json.dumps(asdict(about) | {"domain": domain}))
+        lock.flush()
     before = dict(os.environ)
-    os.environ |= {
-        DOMAIN_VARIABLE: str(domain),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_LOG_DIR": str(log.resolve()),
-    }
-    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_folder() / "ros" / "fastdds.xml"))
+    os.environ["ROS_LOG_DIR"] = str(log.resolve())
+    enter_domain(domain)
     try:
         yield domain
     finally:
+        if about is not None:
+            lock.truncate(0)
         for name in os.environ.keys() - before.keys():
             del os.environ[name]
         os.environ |= before
         lock.close()
+
+
+def enter_domain(domain: int) -> None:
+    """Let ROS, loaded after this, speak in a domain on this machine alone, as a run of `sdimu` does."""
+    os.environ |= {DOMAIN_VARIABLE: str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_folder() / "ros" / "fastdds.xml"))
+
+
+@dataclass(frozen=True)
+class RunningTest:
+    """A test that a run of `sdimu` on this machine makes, as it tells those that watch it.
+
+    Attributes
+    ----------
+    folder : str
+        Of its results.
+    duration_s : float
+        0 where nobody knows.
+    stops : int
+        0 where nobody knows.
+    model, imu : str
+    start_ns : int
+        Stamp of its begin.
+    domain : int
+    """
+
+    folder: str
+    duration_s: float = 0.0
+    stops: int = 0
+    model: str = "baseline"
+    imu: str = "dtg"
+    start_ns: int = 0
+    domain: int = 0
+
+
+def running_tests() -> tuple[RunningTest, ...]:
+    """Return the tests that runs of `sdimu` make on this machine now, by domain."""
+    found = []
+    for path in Path(tempfile.gettempdir()).glob(f"{_LOCK}*.lock"):
+        number = path.stem.removeprefix(_LOCK)
+        if number.isdigit() and is_held(int(number)) and (test := _told(path, int(number))) is not None:
+            found.append(test)
+    return tuple(sorted(found, key=lambda test: test.domain))
+
+
+def is_held(domain: int) -> bool:
+    """Tell whether a run of `sdimu` holds a domain."""
+    path = _lock_file(domain)
+    if not path.is_file():
+        return False
+    lock = _locked(domain)
+    if lock is None:
+        return True
+    lock.close()
+    return False
+
+
+def _told(path: Path, domain: int) -> RunningTest | None:
+    """Read what a run tells of its test; None where it tells nothing, such as a test of the nodes alone."""
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return RunningTest(
+            str(told["folder"]),
+            float(told["duration_s"]),
+            int(told["stops"]),
+            str(told["model"]),
+            str(told["imu"]),
+            int(told["start_ns"]),
+            domain,
+        )
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
 
 
 @contextmanager
@@ -99,9 +178,13 @@ def _stated_domain(number: int) -> tuple[int, IO[str]]:
 def _locked(number: int) -> IO[str] | None:
     """Lock a domain; None when it is taken."""
     try:
-        return _lock(Path(tempfile.gettempdir()) / f"sdimu-domain-{number}.lock")
+        return _lock(_lock_file(number))
     except OSError:
         return None  # another user's
+
+
+def _lock_file(number: int) -> Path:
+    return Path(tempfile.gettempdir()) / f"{_LOCK}{number}.lock"
 
 
 def _lock(path: Path) -> IO[str] | None:
@@ -164,7 +247,7 @@ class Children:
         given = {key: value for key, value in parameters.items() if value != []}
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.
         file = self._log / f"{name}.yaml"
-        file.write_text(yaml.safe_dump({name: {"ros__parameters": given}}), encoding="utf-8")
+        file.write_text(_dumped({name: {"ros__parameters": given}}), encoding="utf-8")
         self.run(name, module, ["--ros-args", "--params-file", str(file)])
 
     def run(self, name: str, module: str, arguments: Sequence[str]) -> None:
@@ -213,6 +296,22 @@ class Children:
             except subprocess.TimeoutExpired:  # noqa: PERF203 (three processes)
                 process.kill()
                 process.wait()
+
+
+class _Quoted(yaml.SafeDumper):
+    """Writes every text in quotes: ROS takes a bare ``y`` for true, where YAML's own rules keep it a text."""
+
+
+def _quoted(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"')
+
+
+_Quoted.add_representer(str, _quoted)
+
+
+def _dumped(parameters: Mapping[str, Any]) -> str:
+    """Write a file of ROS parameters."""
+    return str(yaml.dump(parameters, Dumper=_Quoted, width=10**6))
 
 
 def _die_with_parent() -> None:

@@ -14,7 +14,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
-from sdimu_calibration.cli.opened import leave, tell
+from sdimu_calibration.cli.opened import leave, printing, tell
 from sdimu_calibration.cli.options import FitRequest, Place, StatedOpening
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.core.note import without_advice
@@ -94,6 +94,7 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.storage.set_work import judged_outcome
 
     console = plain(stderr=asked.request.as_json)
+    printed = printing(console, asked.request.pdf)
     with _begun(console, asked) as (members, options, run, progress):
         result = _with_serial(judged_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
@@ -101,6 +102,7 @@ def calibrate_together(asked: SetRequest) -> None:
     with written_together(folder) as part:
         write_result(part / "result.json", result)
         write_report(part / "report.html", result, title=page_title(asked, "Calibration", result), trace=_trace(asked))
+    printed(folder / "report.html")
     _show(console, result)
     say(console, f"results in {folder}")
     answer(folder / "result.json", asked.request.as_json)
@@ -114,6 +116,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     from sdimu_calibration.storage.files.result_file import write_result
 
     console = plain(stderr=asked.request.as_json)
+    printed = printing(console, asked.request.pdf)
     found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
@@ -129,6 +132,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
             trace=_trace(asked),
             spell=partial(spelled, asked=about),
         )
+    printed(folder / "report.html")
     _show(console, after, diagnosed=True)
     say(console, f"{found.verdict}: {found.sentence}")
     print_advice(console, found.advice, about)

@@ -2,47 +2,173 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdimu_calibration.core.data_error import DataError
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from sdimu_calibration.cli.processes import RunningTest
+    from sdimu_calibration.cli.watch import Outline
+    from sdimu_calibration.nodes.monitor import Monitor
+
 
 def watch(
-    model: Annotated[str, typer.Option(help="Model that the node estimates: names the effects and their units.")] = (
-        "baseline"
-    ),
-    domain: Annotated[int | None, typer.Option(min=0, max=232, help="ROS domain; ROS_DOMAIN_ID when left out.")] = None,
-    seconds: Annotated[float, typer.Option("--for", min=0.0, help="Wall time to watch (s); 0 ends with Ctrl-C.")] = 0.0,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="Model that the node estimates: names the effects and their units; that of the run, baseline."
+        ),
+    ] = None,
+    domain: Annotated[
+        int | None,
+        typer.Option(min=0, max=232, help="ROS domain; ROS_DOMAIN_ID, or that of the sdimu run on this machine."),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option("--for", min=0.0, help="Wall time to watch (s); 0 ends with the test, or with Ctrl-C.")
+    ] = 0.0,
+    add: Annotated[
+        list[str] | None,
+        typer.Option(metavar="EFFECT", help="Add an effect to the model of the running test; repeatable."),
+    ] = None,
 ) -> None:
     """Watch a running test: stop, sigmas, light of the innovations, and the diagnosis at the end of each stop."""
-    import os
     import time
 
     from sdimu_calibration.cli.console import console as make_console
-    from sdimu_calibration.cli.watch import Outline, Watch
-    from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.storage.files.effect_file import extended_model
+    from sdimu_calibration.cli.processes import enter_domain
 
-    chosen = extended_model(model, ())
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in chosen.effects]
-    units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
-    if domain is not None:
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
+    test = watched(domain)
+    outline, first = _outline(test, model, tuple(add or ()))
+    if test is not None:
+        enter_domain(test.domain)
+    used = _entered(domain)
     # The domain is read when ROS is loaded.
     from sdimu_calibration.nodes.monitor import Monitor
 
     console, begun = make_console(), time.monotonic()
-    used = os.environ.get("ROS_DOMAIN_ID", "0")
-    end = f"ends after {seconds:g} s" if seconds else "Ctrl-C ends"
-    console.print(f"watching ROS domain {used}; {end}", highlight=False)
-    monitor = Monitor()
+    end = f"ends after {seconds:g} s" if seconds else "ends with the test, or with Ctrl-C"
+    where = "" if test is None else f", the run into {test.folder}"
+    console.print(f"watching ROS domain {used}{where}; {end}", highlight=False, soft_wrap=True)
+    monitor = Monitor(None if test is None else test.start_ns, first)
     try:
-        with Watch(console, Outline(0.0, 0, [effect.key for effect in effects], units)) as shown:
-            while not seconds or time.monotonic() - begun < seconds:
-                shown.show(monitor.listen(0.2), True, time.monotonic() - begun)
+        if add and (why := monitor.add(add)):
+            raise DataError(f"--add {' '.join(add)}: {why}")
+        ended = _follow(console, monitor, outline, used if test is not None else None, seconds)
     finally:
         monitor.close()
     if not monitor.progress.heard:
-        raise DataError(f"ROS domain {used}: nothing heard in {seconds:g} s (is a test running? state its --domain)")
+        raise DataError(
+            f"ROS domain {used}: nothing heard in {time.monotonic() - begun:.0f} s (is a test running? "
+            "state its --domain)"
+        )
+    if ended:
+        results = "" if test is None else f"; results in {test.folder}"
+        console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
+
+
+@dataclass
+class Pace:
+    """How long a test has taken, told from its pace since it is watched: it may have begun long before.
+
+    Attributes
+    ----------
+    joined : tuple of float or None
+        Time of the test and wall time (s) when it was first heard.
+    """
+
+    joined: tuple[float, float] | None = None
+
+    def wall(self, table_s: float, wall_s: float) -> float:
+        """Wall time (s) that the test has taken so far at this pace; 0 while it is unknown."""
+        if table_s <= 0.0:
+            return 0.0
+        if self.joined is None:
+            self.joined = table_s, wall_s
+        gone, took = table_s - self.joined[0], wall_s - self.joined[1]
+        return table_s * took / gone if gone > 0.0 else 0.0
+
+
+def watched(domain: int | None) -> RunningTest | None:
+    """Return the run of `sdimu` on this machine that is meant; None where none is, but perhaps another's test.
+
+    Parameters
+    ----------
+    domain : int, optional
+        As stated.
+    """
+    from sdimu_calibration.cli.processes import running_tests, stated_domain
+    from sdimu_calibration.core.recording import DataError
+
+    tests = running_tests()
+    stated = domain if domain is not None else stated_domain()
+    if stated is not None:
+        return next((test for test in tests if test.domain == stated), None)
+    if len(tests) > 1:
+        listed = ", ".join(f"--domain {test.domain} ({test.folder})" for test in tests)
+        raise DataError(f"{len(tests)} tests run on this machine; state one: {listed}")
+    return tests[0] if tests else None
+
+
+def _entered(domain: int | None) -> int:
+    """Domain that ROS will use, once it is loaded."""
+    import os
+
+    from sdimu_calibration.cli.processes import DOMAIN_VARIABLE, stated_domain
+
+    if domain is not None:
+        os.environ[DOMAIN_VARIABLE] = str(domain)
+    return stated_domain() or 0
+
+
+def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]) -> tuple[Outline, dict[str, float]]:
+    """Outline of a test, and sigmas (SI) at its begin by coefficient: those of the IMU's file, where it is known."""
+    import numpy as np
+
+    from sdimu_calibration.cli.watch import Outline
+    from sdimu_calibration.core.effects import selection
+    from sdimu_calibration.core.effects.body_frame import frame_jacobian
+    from sdimu_calibration.core.effects.imu_model import prior_size
+    from sdimu_calibration.storage.files.config import load_imu
+    from sdimu_calibration.storage.files.effect_file import extended_model
+
+    chosen = extended_model(model or (test.model if test is not None else "baseline"), added)
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in chosen.effects]
+    units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
+    keys = [effect.key for effect in effects]
+    if test is None:
+        return Outline(0.0, 0, keys, units), {}
+    imu = load_imu(test.imu)
+    size = np.array([prior_size(effect, imu) or 0.0 for effect in effects for _ in effect.parameters])
+    # Published sigmas are those in the body frame, to which misalignments of both triads add up.
+    J = frame_jacobian(list(units), chosen.body_frame)
+    first = dict(zip(units, np.sqrt((J**2) @ size**2).tolist(), strict=True))
+    return Outline(test.duration_s, test.stops, keys, units), first
+
+
+def _follow(console: Console, monitor: Monitor, outline: Outline, domain: int | None, seconds: float) -> bool:
+    """Show a test until its end, or for a while; whether it has ended.
+
+    Parameters
+    ----------
+    domain : int or None
+        Held by the run of `sdimu` as long as the test lasts; None for nodes that somebody else started.
+    """
+    import time
+
+    from sdimu_calibration.cli.processes import is_held
+    from sdimu_calibration.cli.watch import Watch
+
+    begun = time.monotonic()
+    pace = Pace()
+    with Watch(console, outline) as shown:
+        while not seconds or time.monotonic() - begun < seconds:
+            now = monitor.listen(0.2)
+            shown.show(now, True, pace.wall(now.table_s, time.monotonic() - begun))
+            if not is_held(domain) if domain is not None else monitor.left():
+                return True
+    return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from sdimu_calibration.cli.console import say
+from sdimu_calibration.cli.console import pair, say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,4 +62,4 @@ def _paragraphs(console: Console, headings: Sequence[str], lines: Sequence[Seque
         say(console, line[0])
         for heading, text in zip(headings[1:], line[1:], strict=True):
             if text:
-                say(console, f"  {heading:{indent}}  {text}")
+                pair(console, heading, text, indent)

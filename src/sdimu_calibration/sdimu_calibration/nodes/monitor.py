@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import rclpy
@@ -9,6 +11,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -20,6 +24,8 @@ from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
+ANSWER_S = 20.0
+"""Wall time in which a node answers (s): one that fits a block of samples answers after it."""
 # Watching must never hold up what is watched.
 GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -57,11 +63,19 @@ class Progress:
 
 
 class Monitor:
-    """Listens to a running test inside the process that shows it; close it after use."""
+    """Listens to a running test inside the process that shows it; close it after use.
 
-    def __init__(self) -> None:
-        self.progress = Progress()
-        self._start_ns: int | None = None
+    Parameters
+    ----------
+    start_ns : int, optional
+        Stamp of the begin of the test; without it that of the first status that is heard.
+    first : mapping of str to float, optional
+        Sigma (SI) by coefficient at the begin of the test; without it the first that is published.
+    """
+
+    def __init__(self, start_ns: int | None = None, first: Mapping[str, float] | None = None) -> None:
+        self.progress = Progress(first=dict(first or {}))
+        self._start_ns = start_ns
         self._context = Context()
         # Ctrl-C belongs to the command line.
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
@@ -79,6 +93,48 @@ class Monitor:
         """Listen for a while; the progress now."""
         self._executor.spin_until_future_complete(self._never, seconds)
         return self.progress
+
+    def left(self) -> bool:
+        """Tell whether a test that was heard has nodes no more."""
+        topics = ("rate_table/status", "calibration/coefficients")
+        return self.progress.heard and not any(self._node.count_publishers(topic) for topic in topics)
+
+    def add(self, effects: Sequence[str], seconds: float = ANSWER_S) -> str:
+        """Let the calibration node take effects into the model, beside those that were added before.
+
+        Parameters
+        ----------
+        effects : sequence of str
+            Names, equations or files.
+        seconds : float
+            Wall time in which the node must answer.
+
+        Returns
+        -------
+        str
+            Why it did not; empty when it did.
+        """
+        client = AsyncParameterClient(self._node, "calibration")
+        if not self._answered(client.services_are_ready, seconds):
+            return "no calibration node answers in this domain"
+        known = client.get_parameters(["add"])
+        if not self._answered(known.done, seconds):
+            return "the calibration node does not answer"
+        before = [text for text in known.result().values[0].string_array_value if text]
+        value = Parameter("add", Parameter.Type.STRING_ARRAY, list(dict.fromkeys([*before, *effects])))
+        answer = client.set_parameters([value])
+        if not self._answered(answer.done, seconds):
+            return "the calibration node does not answer"
+        response = answer.result().results[0]
+        return "" if response.successful else str(response.reason)
+
+    def _answered(self, done: Callable[[], bool], seconds: float) -> bool:
+        begun = time.monotonic()
+        while not done():
+            if time.monotonic() - begun > seconds:
+                return False
+            self.listen(0.05)
+        return True
 
     def close(self) -> None:
         """Leave the domain."""

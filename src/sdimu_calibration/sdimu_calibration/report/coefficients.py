@@ -85,25 +85,28 @@ def priors(fit: Fit | None) -> dict[str, float]:
 
 
 def grouped_table(entries: Sequence[table.Row]) -> str:
-    """Return the table of coefficients: a heading for each effect, gyros before accelerometers."""
+    """Return the coefficients, those of the gyros beside those of the accelerometers; a heading for each effect."""
     columns = table.headings(list(entries))
     kinds = [' class="text"' if column in _TEXT else "" for column in columns]
     head = "".join(f'<th scope="col"{kind}>{escape(c)}</th>' for c, kind in zip(columns, kinds, strict=True))
     effects: dict[str, list[table.Row]] = {}
     for row in entries:
         effects.setdefault(row.effect, []).append(row)
-    lines = []
+    tables = []
     for triad in _TRIADS:
+        lines = []
         for key, rows in effects.items():
             if _triad(key) != triad:
                 continue
             words = tip(title_of(key), effect_of_key(key), [row.name for row in rows])
             lines.append(f'<tr class="group"><th colspan="{len(columns)}" scope="colgroup">{words}</th></tr>')
             lines += [_line(row, columns, kinds) for row in rows]
-    return (
-        f'<div class="wide"><table id="coefficient-table"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(lines)}</tbody></table></div>"
-    )
+        if lines:
+            tables.append(
+                f'<div class="wide"><table><caption>{triad}</caption><thead><tr>{head}</tr></thead>'
+                f"<tbody>{''.join(lines)}</tbody></table></div>"
+            )
+    return f'<div class="triads" id="coefficient-table">{"".join(tables)}</div>'
 
 
 def _line(row: table.Row, columns: list[str], kinds: Sequence[str]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.error_figures import (
     by_hand,
     held_out_judged,
@@ -16,8 +15,9 @@ from sdimu_calibration.core.error_figures import (
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.cost import coefficients_off
 
-_HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "moved by more than 2 sigma")
+_HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "wrong without it")
 _NOISE = "noise learned"
 _OTHER_STOPS = "the results leave out different stops: their log-likelihoods and errors do not compare"
 _OTHER_SCALE = "not with one site and one noise specification: log-likelihoods and NIS are of different scales"
@@ -101,8 +101,7 @@ def _row(name: str, result: Calibration, before: Calibration | None, held_out: f
     else:
         model = _change(before.model, result.model)
         difference = f"{likelihood - log_likelihood(before):+.1f}"
-        sizes = moved_coefficients(before, result)[:_MOST_MOVED]
-        moved = ", ".join(f"{coefficient} {size:+.1f}" for coefficient, size in sizes)
+        moved = ", ".join(off.text for off in coefficients_off(before, result)[:_MOST_MOVED])
     return [name, model, f"{likelihood:.1f}", difference, f"{nis(result):.3f}", f"{held_out:.3f}", moved]
 
 

@@ -13,9 +13,6 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.formula import mathml
 from sdimu_calibration.report.groups import title as in_words
 
-MOST_FAMILIES = 3
-"""Number of families that a headline names: the table has the rest."""
-
 
 @cache
 def effect_of_key(key: str) -> Effect | None:
@@ -62,13 +59,3 @@ def family_words(group: Sequence[Found]) -> str:
     axes = [label.partition("(")[0].removeprefix(stem).strip("_") for label in labels]
     words = f"{first.effect.title}{', ' + ', '.join(axes) if any(axes) else ''}{first.effect.variant}"
     return tip(words, first.effect, labels)
-
-
-def headline_of(found: Sequence[Found]) -> str:
-    """Name the families with the largest scores, and count the rest, as HTML."""
-    groups = families(found)
-    words = [family_words(group) for group in groups[:MOST_FAMILIES]]
-    more = len(groups) - len(words)
-    if more:
-        words.append(f"{more} more")
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]

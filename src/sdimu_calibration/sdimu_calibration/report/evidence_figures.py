@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def deviates(
         Pixels.
     """
     numbered = len(columns) <= _MOST_NUMBERED
-    text = [[cell(v) if numbered else _sign(v) for v in row] for row in value]
+    text = [[cell(v) if numbered else sign(v) for v in row] for row in value]
     figure = Figure()
     figure.add(
         "heatmap",
@@ -89,17 +89,32 @@ def cell(value: float) -> str:
     return shown.replace("-", "\N{MINUS SIGN}")
 
 
-def _sign(value: float) -> str:
+def sign(value: float) -> str:
     """Write a cell where there is room for one character: the sign of what stands out."""
     if not abs(value) > data.NOTABLE:
         return ""
     return "+" if value > 0.0 else "\N{MINUS SIGN}"
 
 
-def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
-    """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches."""
-    shown = data.best_variants(entries)[:_MOST_BARS]
-    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
+def ranking(
+    entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, Mapping[str, str]] | None = None
+) -> Figure:
+    """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches.
+
+    Parameters
+    ----------
+    entries : sequence of Scored
+    threshold : float
+        Score that noise reaches.
+    classes : mapping of str to mapping, optional
+        By the label of an effect that was found: what it may be, itself first, each with its probability in words.
+        Those share the bar of the effect.
+    """
+    told = classes or {}
+    folded = {name for label, shares in told.items() for name in shares if name != label.partition("(")[0]}
+    left = [s for s in data.best_variants(entries) if s.chosen or s.label.partition("(")[0] not in folded]
+    shown = left[:_MOST_BARS]
+    names = [_bar_name(s, told.get(s.label, {})) for s in shown]
     sizes = [with_sigma(s.estimate, s.sigma, s.unit) for s in shown]
     figure = Figure()
     figure.add(
@@ -108,7 +123,12 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
         x=[abs(s.z) for s in shown],
         orientation="h",
         name="model as given",
-        marker={"color": [MUTED if s.chosen else PALE for s in shown], "line": {"color": INK, "width": 1}},
+        marker={
+            "color": [_family_ink(s.label) for s in shown],
+            "opacity": [1.0 if s.chosen else _ASIDE for s in shown],
+            "line": {"color": INK, "width": 1},
+        },
+        showlegend=False,
         customdata=sizes,
         hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
     )
@@ -134,6 +154,10 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
             marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
         )
+    for word, ink in _FAMILY_INK.items():
+        if any(_family_ink(s.label) == ink for s in shown):
+            mark = {"symbol": "square", "color": ink, "size": 10}
+            figure.add("scatter", x=[None], y=[None], mode="markers", name=word, marker=mark, hoverinfo="skip")
     figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
     figure.annotate(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
@@ -142,7 +166,29 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
     figure.x_axes(title="score |z| (sigma)", range=[0, 1.3 * top])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
-    return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
+    lines = sum(name.count("<br>") for name in names)
+    return lay_out(figure, 24 * len(shown) + 14 * lines + 150, showlegend=True, margin=margin, legend=_LEGEND)
+
+
+_FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
+"""Ink of a bar by what its effect acts on."""
+_ASIDE = 0.45
+"""Opacity of the bar of an effect that was not found (1): those that were stand out."""
+
+
+def _family_ink(label: str) -> str:
+    triad = label.partition("_")[0]
+    return _FAMILY_INK[{"gyro": "gyro", "accel": "accelerometer"}.get(triad, "other")]
+
+
+def _bar_name(entry: data.Scored, shares: Mapping[str, str]) -> str:
+    """Label of a bar: a triangle at what was found, and what it may be instead below it."""
+    if not entry.chosen:
+        return entry.label
+    own = entry.label.partition("(")[0]
+    lines = [f"\N{BLACK RIGHT-POINTING TRIANGLE} {entry.label} {shares.get(own, '')}".rstrip()]
+    lines += [f"or {name} {p}" for name, p in shares.items() if name != own]
+    return "<br>".join(lines)
 
 
 def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, white: bool = False) -> Figure:

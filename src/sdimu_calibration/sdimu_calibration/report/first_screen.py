@@ -5,26 +5,30 @@ A `FirstScreen` says it in words; the same parts stand on the page of a diagnosi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
-from sdimu_calibration.core.diagnosis.ladder import error_ladder, moved_coefficients
+from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
-from sdimu_calibration.report.effect_words import headline_of, title_of
+from sdimu_calibration.report.cost import Off, coefficients_off, in_use, wrong_without
+from sdimu_calibration.report.effect_words import tip
+from sdimu_calibration.report.glossary import explained
+from sdimu_calibration.report.ladder_strip import ladder_strip
 from sdimu_calibration.report.markup import prose
-from sdimu_calibration.report.table import with_sigma
+from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.storage.files.verdict_words import headline, name_of
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}
@@ -32,6 +36,7 @@ _WORDS = {GOOD: "The model explains the data", DOUBTFUL: "With reservations", BA
 _ARROW = " \N{RIGHTWARDS ARROW} "
 _IN_WHITE = "in white noise, in which models compare"
 """What an error means that is not in the noise that was learned."""
+_COSTS, _PREDICTS = "What it costs to ignore it", "How well it predicts"
 _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
 
@@ -52,35 +57,67 @@ class FirstScreen:
         What to do next, the most useful first.
     remarks : tuple of str
         What a reader must know before the numbers, besides the verdict.
+    tag : str
+        The verdict in a few words; empty for those of the tone.
+    ladder : str
+        Models with their errors, above the costs.
     """
 
     tone: str
     head: str
     costs: tuple[tuple[str, str], ...] = ()
     advice: tuple[str, ...] = ()
-    cost_title: str = field(default="What it costs to ignore it")
+    cost_title: str = _COSTS
     remarks: tuple[str, ...] = ()
+    tag: str = ""
+    ladder: str = ""
 
 
-def of_diagnosis(summary: DiagnosisSummary, spell: Spell | None = None) -> FirstScreen:
-    """Say what a diagnosis found; `spell` makes whole commands of its advice."""
+def of_diagnosis(
+    summary: DiagnosisSummary, spell: Spell | None = None, more: ReportExtras | None = None
+) -> FirstScreen:
+    """Say what a diagnosis found; `spell` makes whole commands of its advice, `more` says what it costs in metres."""
     d = summary.diagnosis
-    named = bool(summary.candidates) and d.verdict != Verdict.DATA_FAULT
     doubts = without_advice(d.after.warnings) if d.adequate else ()
-    bad = not d.adequate and d.verdict != Verdict.NOISE_MODEL_WRONG
-    tone = BAD if bad else GOOD if d.adequate and not doubts else DOUBTFUL
-    head = _missing(summary) if named else prose(d.sentence)
+    tone, tag = _judged(summary, bool(doubts))
     advice: list[Advice | str] = list(dict.fromkeys([*(f.text for f in d.findings), *doubts, *summary.advice]))
     if d.adequate and not advice:
         advice = ["Use the coefficients of this page."]
-    if d.adequate and summary.untestable:
+    if summary.untestable and (d.adequate or summary.candidates):
         advice.append(_unseen(summary))
-    costs = _costs(summary)
-    title = "What it costs to ignore it" if summary.found else "How well it predicts"
+    title = _COSTS if summary.found else _PREDICTS
     told = tuple(advice_html(one, spell) for one in advice)
-    unsaid = [text for text in d.noise if named or text not in d.sentence]
+    said = headline(summary)
+    unsaid = [text for text in d.noise if text not in said]
     noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
-    return FirstScreen(tone, head, costs, told, title, (*_remarks(d.after), *noise))
+    remarks = (*_remarks(d.after), *noise)
+    ladder = ladder_strip(summary, more)
+    return FirstScreen(tone, _head(summary), _costs(summary, more), told, title, remarks, tag, ladder)
+
+
+def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
+    """Tone of the page, and the word for it."""
+    d = summary.diagnosis
+    if d.verdict == Verdict.DATA_FAULT:
+        return BAD, "The data have a fault"
+    if summary.candidates:
+        return DOUBTFUL, "Something is missing in the model"
+    if d.verdict == Verdict.NOISE_MODEL_WRONG:
+        return DOUBTFUL, "The noise is not as stated"
+    if not d.adequate:
+        return BAD, _WORDS[BAD]
+    tone = DOUBTFUL if doubts or held_out_judged(d.after) > MISFIT else GOOD
+    return tone, _WORDS[tone]
+
+
+def _head(summary: DiagnosisSummary) -> str:
+    """Verdict as HTML, the equation of each effect that was found under its name."""
+    html = prose(headline(summary)).replace("(-", "(\N{MINUS SIGN}")
+    for one in summary.candidates:
+        words = name_of(one)
+        shown = tip(words, one.candidate.effect, [one.candidate.label])
+        html = html.replace(escape(words), shown, 1)
+    return html
 
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
@@ -98,42 +135,26 @@ def _unseen(summary: DiagnosisSummary) -> str:
     )
 
 
-def _missing(summary: DiagnosisSummary) -> str:
-    """Name what is missing by families, and what looks the same as the first."""
-    found = summary.candidates
-    one = len(found) == 1
-    size = ""
-    if one:
-        unit = found[0].candidate.parameter.display_unit
-        size = " (" + prose(with_sigma(from_si(found[0].value, unit), from_si(found[0].sigma, unit), unit)) + ")"
-    alike = [title_of(name) for name in found[0].alike[:2]] if one else []
-    more = f", or what looks the same here: {escape('; '.join(alike))}" if alike else ""
-    words = "An equation that the catalogue lacks fits" if summary.diagnosis.own else "Missing in the model"
-    return f"{words}: {headline_of(found)}{size}{more}."
-
-
-def _costs(summary: DiagnosisSummary) -> tuple[tuple[str, str], ...]:
+def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[str, str], ...]:
+    """Say what is wrong without what was found; of a model that lacks nothing metres and the held-out error."""
     d, out = summary.diagnosis, []
     rungs = error_ladder(d)
-    where = "rests" if d.fit.learns_scatter else "stops"
-    values = [f"{value:.2f}" for value in dict.fromkeys((rungs[0][1], rungs[-1][1])) if np.isfinite(value)]
+    if len(rungs) < 2 and (use := in_use(more)) is not None:
+        out.append((use.figures.replace(" -> ", _ARROW), escape(use.words)))
+    out += [_off(one) for one in wrong_without(summary, more)[:_WORST]]
     if noise_learned(d.after):
         out.append(_in_noise(held_out_judged(d.after)))
-    if values:
+    if len(rungs) < 2 and np.isfinite(rungs[0][1]):
+        where = "rests" if d.fit.learns_scatter else "stops"
         means = _IN_WHITE if noise_learned(d.after) else "1 is right"
-        out.append((_ARROW.join(values), f"sigma: held-out error, at {where} that the fit has not seen; {means}"))
-    units = dict(zip(d.before.names, d.before.display_units, strict=True))
-    at = {name: k for k, name in enumerate(d.before.names)}
-    for name, sigmas in moved_coefficients(d.before, d.after)[:_WORST]:
-        off = -sigmas * np.sqrt(d.before.covariance[at[name], at[name]])
-        unit = units[name]
-        out.append(
-            (
-                f"{from_si(float(off), unit):+.3g} {unit}".replace("-", "\N{MINUS SIGN}"),
-                f"<code>{name}</code> is off without it: {abs(sigmas):.0f} of its sigmas",
-            )
-        )
+        out.append((f"{rungs[0][1]:.2f}", f"sigma: held-out error, at {where} that the fit has not seen; {means}"))
     return tuple(out)
+
+
+def _off(one: Off) -> tuple[str, str]:
+    """Say by how much a coefficient is wrong."""
+    amount = f"{one.amount:+.3g} {one.unit}".replace("-", "\N{MINUS SIGN}")
+    return amount, f"<code>{escape(one.name)}</code> is off without it: {abs(one.sigmas):.1f} of its sigmas"
 
 
 def _in_noise(error: float) -> tuple[str, str]:
@@ -157,7 +178,7 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
     advice: list[Advice | str] = ["Check the IMU file, the site, units and axes."] if grave else []
     advice.append(Advice(kind, (), Verb.DIAGNOSE, bag))
     told = tuple(advice_html(one, spell) for one in advice)
-    return FirstScreen(tone, head, costs, told, "How well it predicts", _remarks(calibration))
+    return FirstScreen(tone, head, costs, told, _PREDICTS, _remarks(calibration))
 
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
@@ -175,15 +196,31 @@ def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
 
 def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     """Say what was found in a set of recordings; `spell` makes whole commands of its advice."""
-    tone = GOOD if found.verdict == Verdict.CONSISTENT else BAD
     after = held_out(found.after)
     before = after if found.error_without is None else found.error_without
+    off = coefficients_off(found.before, found.after) if found.findings else ()
+    costs = [_off(one) for one in off[:_WORST]]
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
-    costs = ((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"),) if values else ()
-    advice: tuple[Advice | str, ...] = found.advice or ("Nothing: use the coefficients of this page.",)
+    if values:
+        costs.append((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"))
+    holds = ", which hold what was found" if found.findings else ""
+    advice: tuple[Advice | str, ...] = found.advice or (f"Use the coefficients of this page{holds}.",)
     told = tuple(advice_html(one, spell) for one in advice)
-    title = "What it costs to ignore it" if found.findings else "How well it predicts"
-    return FirstScreen(tone, prose(found.sentence), costs, told, title)
+    tone, tag = _set_judged(found, after)
+    title = _COSTS if found.findings else _PREDICTS
+    return FirstScreen(tone, prose(found.sentence), tuple(costs), told, title, tag=tag)
+
+
+def _set_judged(found: SetDiagnosis, error: float) -> tuple[str, str]:
+    """Tone of the page of a set, and the word for it."""
+    if found.verdict == Verdict.CONSISTENT:
+        tone = DOUBTFUL if error > MISFIT else GOOD
+        return tone, _WORDS[tone]
+    if found.verdict == Verdict.UNEXPLAINED:
+        return BAD, _WORDS[BAD]
+    if found.verdict == Verdict.DATA_FAULT:
+        return BAD, "One recording is unlike the others"
+    return DOUBTFUL, "Something is missing in the model"
 
 
 def render(first: FirstScreen, *pictures: str) -> str:
@@ -192,16 +229,17 @@ def render(first: FirstScreen, *pictures: str) -> str:
         f'<li><span class="figure-number">{escape(number)}</span><span>{words}</span></li>'
         for number, words in first.costs
     )
+    what = f'{first.ladder}<ul class="numbers">{costs}</ul>'
     shown = "".join(f"<li>{text}</li>" for text in first.advice[:_WORST])
     rest = "".join(f"<li>{text}</li>" for text in first.advice[_WORST:])
     more = f"<details><summary>{len(first.advice) - _WORST} more</summary><ul>{rest}</ul></details>" if rest else ""
     return (
         f'<section id="verdict"><h2 class="skip">Verdict</h2><div class="verdict {first.tone}" role="status">'
         f'<p class="head"><span class="mark" aria-hidden="true">{_MARKS[first.tone]}</span> '
-        f'<span class="tag">{_WORDS[first.tone]}</span> {first.head}</p>'
+        f'<span class="tag">{first.tag or _WORDS[first.tone]}</span> {first.head}</p>'
         f"{''.join(f'<p>{text}</p>' for text in first.remarks)}</div>"
         f'<div class="columns"><section class="card"><h2>{first.cost_title}</h2>'
-        f'<ul class="numbers">{costs}</ul></section>'
+        f"{explained(what)}</section>"
         f'<section class="card"><h2>What to do next</h2><ol>{shown}</ol>{more}</section></div>'
         f'<div class="pictures">{"".join(picture for picture in pictures if picture)}</div></section>'
     )

@@ -19,6 +19,9 @@ Rows = tuple[tuple[str, str], ...]
 AS_GIVEN = "as given"
 _QUIET = frozenset({Verdict.CONSISTENT, Verdict.WAITING})
 """Verdicts beside which no candidate is named."""
+_UNSEEN = 1e5
+"""Sigma (customary unit) from which a size is not told: a tenth of g or of a scale factor says that the turns so far do
+not show it."""
 _NAMED = 2
 """Number of candidates that a line names."""
 
@@ -70,6 +73,8 @@ def model_name(added: Sequence[str]) -> str:
 def size(candidate: Ranked) -> str:
     """Write the estimate of a candidate and its sigma, in its customary unit."""
     factor, unit = from_si(1.0, candidate.display_unit), candidate.display_unit
+    if not abs(candidate.sigma * factor) < _UNSEEN:
+        return "size not seen yet"
     return with_sigma(candidate.estimate * factor, candidate.sigma * factor, unit)
 
 

@@ -32,6 +32,7 @@ WORDS = {
     "random_walk": "random walk of bias",
 }
 HEAD = ("channel", "term", "value", "sigma", "unit")
+_WALKS = {"gyro": "deg/sqrt(h)", "accel": "m/s/sqrt(h)"}
 _SHOWN = {"gyro": "deg/h", "accel": "ug"}
 _INK = ("@x", "@y", "@z")
 _DASH = ("solid", "dash", "dot")
@@ -48,8 +49,15 @@ def rows(found: Mapping[str, Terms]) -> list[tuple[str, ...]]:
                 value, sigma = (f"{from_si(float(v[k]), unit):.3g}" for v in (terms.value, terms.sigma))
             else:
                 value, sigma = f"< {from_si(float(terms.upper[k]), unit):.2g}", ""
-            out.append((channel, WORDS[term], value, sigma, unit))
+            walk = _as_walk(channel, float(terms.value[k])) if term == "white" and terms.seen[k] else ""
+            out.append((channel, WORDS[term], value, sigma, f"{unit}{walk}"))
     return out
+
+
+def _as_walk(channel: str, white: float) -> str:
+    """Write white noise (SI) as the random walk that data sheets tell, behind its unit."""
+    unit = _WALKS[channel.partition("_")[0]]
+    return f" = {from_si(white, unit):.3g} {unit}"
 
 
 def misfits(found: Mapping[str, Terms]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html import escape
 
 import numpy as np
@@ -21,7 +22,12 @@ _MOST = 12
 _HEAD = ("", "probability", "", "size if it is this")
 
 
-def odds_section(told: Probabilities | None, where: str = "in this test", averaged: bool = True) -> str:
+def odds_section(
+    told: Probabilities | None,
+    where: str = "in this test",
+    averaged: bool = True,
+    found: Mapping[str, str] | None = None,
+) -> str:
     """Return the section; empty where there are no probabilities.
 
     Parameters
@@ -30,15 +36,20 @@ def odds_section(told: Probabilities | None, where: str = "in this test", averag
         What the data are of, as it ends a sentence.
     averaged : bool
         Coefficients and sigmas of the page are means over the models.
+    found : mapping of str to str, optional
+        Sizes in words of what the page tells as found, by label: a size stands on a page once.
     """
+    sizes = found or {}
     if told is None:
         return ""
     lines = [_line("No effect of the catalogue is missing", told.nothing)]
     families = [one for one in told.families if one.probability >= _LEAST][:_MOST]
     for family in families:
-        lines.append(_line(family_in_words(family), family.probability, size=_only(family)))
+        lines.append(_line(family_in_words(family), family.probability, size=_only(family, sizes)))
         if len(family.members) > 1:
-            lines += [_line(m.label, m.probability, True, _size(m)) for m in family.members[:_MOST]]
+            lines += [
+                _line(m.label, m.probability, True, sizes.get(m.label) or _size(m)) for m in family.members[:_MOST]
+            ]
     lines += [_line(_noise(n), n.probability) for n in told.noise if n.probability >= _LEAST]
     head = "".join(f'<th scope="col"{" class=text" if k == 0 else ""}>{word}</th>' for k, word in enumerate(_HEAD))
     rest = (
@@ -69,8 +80,10 @@ def family_in_words(family: FamilyShare) -> str:
     return f"{words[:1].upper()}{words[1:]}{f', {sensor}' if sensor else ''}"
 
 
-def _only(family: FamilyShare) -> str:
-    return _size(family.members[0]) if len(family.members) == 1 else ""
+def _only(family: FamilyShare, sizes: Mapping[str, str]) -> str:
+    if len(family.members) != 1:
+        return ""
+    return sizes.get(family.members[0].label) or _size(family.members[0])
 
 
 def _size(member: MemberShare) -> str:

@@ -9,20 +9,18 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.error_figures import noise_learned
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report import data, evidence_figures, experiment, first_screen, handheld_sections, sections
+from sdimu_calibration.report import data, experiment, first_screen, handheld_sections, sections
 from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.markup import Draw, prose, quiet, section
+from sdimu_calibration.report.markup import Draw, prose, section
 from sdimu_calibration.report.odds_section import odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.rests_section import rests_section
@@ -31,12 +29,11 @@ from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.unknown_section import unknown_section
 from sdimu_calibration.report.use_section import in_use
+from sdimu_calibration.storage.files.verdict_words import size_of
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
 
 _HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
-_LADDER = 355
-"""Height of the ladder on the first screen (px): that of the heat map beside it."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
     if summary is not None:
         fit = summary.diagnosis.extended
     parts = [
-        _first(calibration, summary, fit, of_set, spell, draw),
+        _first(calibration, contents, fit, draw),
         coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
         odds_section(of_set.probabilities, "in these recordings", averaged=False) if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
@@ -140,21 +137,14 @@ def page(calibration: Calibration, contents: Contents) -> str:
     )
 
 
-def _first(
-    calibration: Calibration,
-    summary: DiagnosisSummary | None,
-    fit: Fit | None,
-    of_set: SetDiagnosis | None,
-    spell: Spell | None,
-    draw: Draw,
-) -> str:
+def _first(calibration: Calibration, contents: Contents, fit: Fit | None, draw: Draw) -> str:
     """Verdict, costs, advice, ladder and heat map."""
+    summary, of_set, spell = contents.summary, contents.of_set, contents.spell
     if summary is not None:
-        verdict = first_screen.of_diagnosis(summary, spell)
-        rungs = error_ladder(summary.diagnosis)
+        verdict = first_screen.of_diagnosis(summary, spell, contents.more)
         handheld = summary.diagnosis.fit.learns_scatter
         maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
-        return first_screen.render(verdict, _ladder(rungs, noise_learned(summary.diagnosis.after), draw), maps)
+        return first_screen.render(verdict, maps)
     if of_set is not None:
         return first_screen.render(first_screen.of_set(of_set, spell))
     learned = bool(calibration.noise)
@@ -167,27 +157,16 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
     return () if summary is None else tuple(n for n in summary.diagnosis.after.names if n not in calibration.names)
 
 
-_WHITE_LADDER = "In white noise, in which models compare: what was learned as noise counts as error here."
-
-
-def _ladder(rungs: Sequence[tuple[str, float]], learned: bool, draw: Draw) -> str:
-    names, values = zip(*rungs, strict=True)
-    if len(rungs) < 2:
-        return ""
-    figure = draw(evidence_figures.rungs(names, values, _LADDER, learned))
-    told = quiet(_WHITE_LADDER) if learned else ""
-    return f'<section class="card"><h2>How far the error falls</h2>{figure}{told}</section>'
-
-
 def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw) -> list[str]:
     """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
+    found = {one.candidate.label: size_of(one) for one in summary.found}
     if diagnosis.fit.learns_scatter:
-        odds = odds_section(diagnosis.probabilities, "in this run")
+        odds = odds_section(diagnosis.probabilities, "in this run", found=found)
         return [odds, *handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
-        odds_section(diagnosis.probabilities),
+        odds_section(diagnosis.probabilities, found=found),
         unknown_section(diagnosis, draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.recording import DataError, TableLog
+from sdimu_calibration.core.results import Calibration
 
 
 @dataclass(frozen=True)
@@ -21,18 +24,29 @@ class ReportExtras:
         Free navigations of segments that no fit has seen.
     no_trial : str
         Why there is none.
+    given : Calibration or None
+        What a calibration delivers with the model as given, noise with a memory learned without what is missing.
     """
 
     table: TableLog | None = None
     trials: tuple[FreeInertialRun, ...] = ()
     no_trial: str = ""
+    given: Calibration | None = None
 
 
-def report_extras(diagnosis: Diagnosis) -> ReportExtras:
-    """Work out what the page of a diagnosis shows in addition."""
+def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportExtras:
+    """Work out what the page of a diagnosis shows in addition.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    delivered : Fit, optional
+        That was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in its place.
+    """
     rivals = [("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table
+    given = None if delivered is None else outcome(delivered, refuse=False)
     try:
-        return ReportExtras(table, diagnosis.fit.free_inertial(rivals))
+        return ReportExtras(table, (delivered or diagnosis.fit).free_inertial(rivals), given=given)
     except DataError as error:
-        return ReportExtras(table, (), str(error))
+        return ReportExtras(table, (), str(error), given)

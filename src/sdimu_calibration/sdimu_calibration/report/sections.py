@@ -9,6 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -22,6 +23,10 @@ from sdimu_calibration.report.effect_words import effect_of_key, families, famil
 from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
+from sdimu_calibration.storage.files.verdict_words import headline
+
+_UNUSUAL = 0.05
+"""Probability (1) below which a right model is unusual: one in twenty."""
 
 
 def numbers(d: Diagnosis) -> str:
@@ -29,8 +34,11 @@ def numbers(d: Diagnosis) -> str:
     left, c = d.free_inputs_after, d.consistency
     if d.fit.learns_scatter:
         return f"p {_probability(d.p_value)} that a right model has a candidate as large as the largest."
+    white = " in white noise" if d.found.noise else ""
+    # Beside an effect that was found, a p of 1 says nothing: its score is what speaks.
+    right = [f"p {_probability(d.p_value)} that a right model{white} looks like this"]
     words = [
-        f"p {_probability(d.p_value)} that a right model{' in white noise' if d.found.noise else ''} looks like this",
+        *(right if d.p_value < _UNUSUAL or not d.found.chosen.size else []),
         f"free inputs: chi-square {d.free_inputs_before.chi2:.0f}"
         + (f" -> {left.chi2:.0f}" if len(d.found.chosen) else "")
         + f" of {left.dof} degrees of freedom",
@@ -130,8 +138,8 @@ def step_row(step: Step) -> list[str]:
 
 
 def _told(step: Step) -> list[str]:
-    moved = ", ".join(f"{name} by {size:+.1f} sigma" for name, size in step.moved if abs(size) >= 0.5)
-    out = [f"{step.label}, while missing, pulled {moved}."] if moved else []
+    moved = ", ".join(f"{name} by {size:+.1f}" for name, size in step.moved if abs(size) >= 0.5)
+    out = [f"{step.label}, while missing, pulled {moved} of the sigmas in white noise."] if moved else []
     if step.alike:
         out.append(f"These data cannot separate {step.label} from {', '.join(step.alike[:6])}.")
     return out
@@ -151,15 +159,16 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
     )
     return section(
         "Effects: what is missing, how large",
-        sentence(d.sentence),
+        sentence(headline(summary)),
         found_table(summary),
         *fits,
         folded(
             "Every candidate, added alone",
-            draw(evidence_figures.ranking(entries, d.found.threshold)),
+            draw(evidence_figures.ranking(entries, d.found.threshold, classes_of(summary.found))),
             quiet(
                 "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
-                "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect."
+                "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect; "
+                "below it stands what looks the same, each with its probability."
             ),
         ),
         folded("Steps of the search", ladder(d)),
@@ -168,7 +177,13 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
     )
 
 
-_FOUND = ("effect", "coefficient", "size", "probability", "z", "explains", "log Bayes factor", "held-out error")
+def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
+    """Say what each effect that was found may be, itself first, each with its probability in words."""
+    named = {one.candidate.label: {share.name: in_percent(share.probability) for share in one.may_be} for one in found}
+    return {label: shares for label, shares in named.items() if len(shares) > 1}
+
+
+_FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor", "held-out error")
 
 
 def found_table(summary: DiagnosisSummary) -> str:
@@ -183,9 +198,8 @@ def found_table(summary: DiagnosisSummary) -> str:
             fall = (one.held_out_before, one.held_out_after)
             cells = (
                 size,
-                in_percent(one.probability) if np.isfinite(one.probability) else "",
+                in_percent(p) if np.isfinite(p := _own_share(one)) else "",
                 f"{one.z:+.1f}",
-                f"{100 * one.explained:.0f} %",
                 f"{one.log_bayes_factor:.0f}",
                 f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else "",
             )
@@ -196,6 +210,12 @@ def found_table(summary: DiagnosisSummary) -> str:
     tried = "" if summary.candidates else sentence("Tried, but not enough to explain the misfit:")
     body = "".join(lines)
     return f'{tried}<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _own_share(one: Found) -> float:
+    """Probability that it is this very coefficient; that of its class where it has no others."""
+    shares = {share.name: share.probability for share in one.may_be}
+    return shares.get(one.candidate.coefficient, one.probability)
 
 
 def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:

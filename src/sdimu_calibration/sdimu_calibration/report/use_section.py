@@ -10,6 +10,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.free_inertial import Drift, FreeInertialRun
 from sdimu_calibration.core.estimation.holdout import WANTED_S
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report import cost
 from sdimu_calibration.report.drawing import AFTER, BEFORE, MUTED, Figure, lay_out
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence
 from sdimu_calibration.report.report_extras import ReportExtras
@@ -40,6 +41,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     return section(
         heading,
         *(sentence(trial_sentence(trial)) for trial in report_extras.trials),
+        sentence(f"Together: {whole.figures}, {whole.words}.") if (whole := cost.in_use(report_extras)) else "",
         draw(figure(report_extras.trials)),
         grid(_COLUMNS, rows, {0, 1}),
         quiet(
@@ -61,7 +63,7 @@ def trial_sentence(trial: FreeInertialRun) -> str:
     """Say a trial in one sentence."""
     stretch = trial.segment
     ends = "; ".join(
-        f"{drift.name} {_metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
+        f"{drift.name} {cost.metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
         for drift in trial.drifts
     )
     return f"Error after {stretch.length_s / 60.0:.1f} min without aid at the {_PLACES[stretch.place]}: {ends}."
@@ -70,7 +72,7 @@ def trial_sentence(trial: FreeInertialRun) -> str:
 def _promise(drift: Drift) -> str:
     """Say what the fit expected; nothing for the drift of no fit."""
     last = float(drift.promised[-1])
-    return f"; its fit predicted {_metres(last)}" if np.isfinite(last) else ""
+    return f"; its fit predicted {cost.metres(last)}" if np.isfinite(last) else ""
 
 
 def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
@@ -91,10 +93,6 @@ def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
 def _rate(drift: Drift) -> float:
     """Error of position over time (nautical miles an hour)."""
     return float(drift.distance[-1] / _NAUTICAL_MILE / (drift.t[-1] / 3600.0))
-
-
-def _metres(value: float) -> str:
-    return f"{value / 1000.0:.2g} km" if value >= 1000.0 else f"{value:.0f} m"
 
 
 def figure(trials: Sequence[FreeInertialRun]) -> Figure:

@@ -23,12 +23,14 @@ from sdimu_sim.cli.options import SeedOption, World
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from sdimu_calibration.cli.processes import Children
+    from sdimu_calibration.cli.processes import Children, RunningTest
     from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.results import Calibration
 
 STALL_S = 180.0
+START_NS = 1_700_000_000_000_000_000
+"""Stamp of the begin of a simulated test (ns): the same in every run, so that runs of one seed are the same."""
 DEFAULT_PLAN = "kim18"
 DEFAULT_MODEL = "baseline"
 
@@ -68,6 +70,7 @@ def run(
     world: World,
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite an earlier run in that folder.")] = False,
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process.
 
@@ -87,8 +90,9 @@ def run(
     console = make_console()
     with own_folder(out):
         begun = time.monotonic()
-        with own_domain(out / "log", domain) as used, Children(out / "log") as children:
-            replace = _clear(out, test.followed)
+        about = _about(options, test, duration, out)
+        with own_domain(out / "log", domain, about) as used, Children(out / "log") as children:
+            _clear(out, test.followed, replace)
             console.print(f"ROS domain {used}", highlight=False)
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
@@ -102,11 +106,21 @@ def run(
     _leave(result, test.adaptive, end)
 
 
+def _about(options: dict[str, dict[str, Any]], test: LiveTest, duration: float, out: Path) -> RunningTest:
+    """Say what is run to those that watch it (`sdimu watch`)."""
+    from sdimu_calibration.cli.processes import RunningTest
+    from sdimu_calibration.storage.files.config import load_plan
+
+    stops = 0 if test.adaptive else len(load_plan(test.followed).dwell_s)
+    start_ns = int(options["table"]["start_ns"])
+    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns)
+
+
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:
     """Parameters of table, IMU and calibration node."""
     plan = test.followed
     return {
-        "table": {"plan": plan, "table": world.table, "seed": test.seed, "speed": test.speed},
+        "table": {"plan": plan, "table": world.table, "seed": test.seed, "speed": test.speed, "start_ns": START_NS},
         "imu": {
             "imu": test.imu,
             "site": world.site,
@@ -150,23 +164,22 @@ def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
         raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
 
 
-def _clear(out: Path, plan: str = DEFAULT_PLAN) -> bool:
-    """Remove the results of an earlier run, once nothing refuses this one; whether its bag may be replaced.
+def _clear(out: Path, plan: str = DEFAULT_PLAN, replace: bool = False) -> None:
+    """Remove the results of an earlier run, once nothing refuses this one: `replace` is asked where there is a bag.
 
     The file of the plan that is to be followed stays.
     """
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
 
-    bag, replace = out / "bag", (out / "log" / "rate_table.yaml").is_file()
-    if not replace and (bag / METADATA).is_file():
+    bag, earlier = out / "bag", (out / "log" / "rate_table.yaml").is_file()
+    if not earlier and (bag / METADATA).is_file():
         raise DataError(f"{bag}: is a bag of no earlier run; move it, or name another folder with --out")
     check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)
-    if replace and not _is_file(plan, out / PLAN):
+    if earlier and not _is_file(plan, out / PLAN):
         (out / PLAN).unlink(missing_ok=True)
-    return replace
 
 
 def _check(options: dict[str, dict[str, Any]]) -> float:
@@ -275,7 +288,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
 
 def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
-    from sdimu_calibration.cli.diagnosis_text import print_out_of_sight
+    from sdimu_calibration.cli.diagnosis_text import cost_lines, print_out_of_sight
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
@@ -287,6 +300,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.trace import traced
 
@@ -295,8 +309,9 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         opened = open_test(out / "bag", site, load_imu(imu))
-        diagnosis = climb(solve(opened, extended_model(model, ())))
-        summary, more = summarise(diagnosis), report_extras(diagnosis)
+        fit = solve(opened, extended_model(model, ()))
+        diagnosis = climb(fit)
+        summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary)
@@ -314,10 +329,23 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         )
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
-    console.print(diagnosis.sentence, soft_wrap=True, highlight=False)
+    for text in (headline(summary), *cost_lines(summary, more)):
+        console.print(text, soft_wrap=True, highlight=False)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
     return result
+
+
+def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisSummary:
+    """Leave out advice to drive other turns where the test itself chose them: its goals ask for what they show."""
+    from dataclasses import replace
+
+    from sdimu_calibration.core.advice import Kind
+
+    if goals is None:
+        return summary
+    about_turns = {Kind.SIGNED_TURNS, Kind.TWO_RATES}
+    return replace(summary, advice=tuple(one for one in summary.advice if one.kind not in about_turns))
 
 
 def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:

@@ -55,7 +55,7 @@ def test_effects_of_a_file_can_be_added_as_the_advice_says(tmp_path):
     path.write_text(MIX)
     candidates = [candidate for effect in find_effects(str(path)) for candidate in split(effect)]
     (advice,) = add([found(candidate) for candidate in candidates])
-    assert sentence(advice).startswith("Keep what was found in the model: ")
+    assert sentence(advice).startswith("Calibrate with what was found in the model: ")
     assert [find_effects(text)[0].labels for text in added(advice)] == [c.effect.labels for c in candidates]
 
 
@@ -84,8 +84,8 @@ def test_what_is_likely_is_tried_and_not_kept():
     open_ = replace(likely, of_family=0.7)
     assert [one.kind for one in add([sure, open_])] == [Kind.KEEP, Kind.TRY]
     kept, tried = (sentence(one) for one in add([sure, open_]))
-    assert kept == "Keep accel_quadratic_x in the model: --add 'accel_quadratic_x'."
-    assert tried.startswith("accel_quadratic_y is likely, not certain")
+    assert kept == "Calibrate with accel_quadratic_x in the model: --add 'accel_quadratic_x'."
+    assert tried.startswith("Which effect it is stays open, accel_quadratic_y is the likeliest")
     assert added(add([sure, open_])[1]) == ["accel_quadratic_x", "accel_quadratic_y"]
 
 

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
+from sdimu_calibration.report.data import Grid
+from sdimu_calibration.report.workbench.figures import heat_map
+from sdimu_calibration.report.workbench.fit import Missing
+from sdimu_calibration.report.workbench.parts import verdict
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State, from_json
+from sdimu_calibration.report.workbench.steps import step
 
 
 def test_undo_goes_back_through_every_step():
     steps = [State()]
-    for step in (lambda s: s.add("a"), lambda s: s.add("b"), lambda s: s.hold((3, 1)), lambda s: s.drop("a")):
-        steps.append(step(steps[-1]))
+    for move in (lambda s: s.add("a"), lambda s: s.add("b"), lambda s: s.hold((3, 1)), lambda s: s.drop("a")):
+        steps.append(move(steps[-1]))
     state = steps[-1]
     assert (state.now.added, state.now.held) == (("b",), (1, 3))
     for before in reversed(steps[:-1]):
@@ -66,3 +75,36 @@ def test_a_page_sends_no_more_than_its_last_hundred_steps():
         state = state.hold((stop,))
     assert len(state.past) == 100
     assert state.undo().now.held == (148,)
+
+
+def test_a_sigma_without_a_unit_has_that_of_the_value():
+    controls = {"coefficient": "accel_bias_z", "mean": "110 ug", "sigma": "5"}
+    assert step(State(), "set-prior", controls).now.priors == (("accel_bias_z", "110 ug", "5 ug"),)
+    own = {**controls, "sigma": "0.005 mg"}
+    assert step(State(), "set-prior", own).now.priors == (("accel_bias_z", "110 ug", "0.005 mg"),)
+
+
+@pytest.mark.parametrize(
+    ("adequate", "mended", "objections", "tone"),
+    [
+        (True, False, (), "good"),
+        (True, False, ("a",), "doubtful"),
+        (False, True, (), "doubtful"),
+        (False, False, (), "bad"),
+    ],
+)
+def test_red_is_for_what_no_effect_mends(adequate, mended, objections, tone):
+    missing = Missing((), 4.0, adequate, "x", None, None, mended=mended)
+    assert verdict(missing, objections)[1] == f"verdict {tone}"
+
+
+def test_numbers_of_many_stops_do_not_run_into_each_other():
+    """28 stops in the column of the map: signs of what stands out stand in the cells, numbers under the mouse."""
+    value = np.full((len(CHANNEL_NAMES), 28), 1.5)
+    value[6, 3] = -4.2
+    drawn = heat_map(Grid(np.arange(28), value), (6, 3)).data[0]
+    texts = {text for row in drawn["text"] for text in row}
+    assert texts == {"", "\N{MINUS SIGN}"}
+    assert "%{z" in drawn["hovertemplate"]
+    few = heat_map(Grid(np.arange(19), value[:, :19]), (6, 3)).data[0]
+    assert few["text"][6][3] == "\N{MINUS SIGN}4.2"

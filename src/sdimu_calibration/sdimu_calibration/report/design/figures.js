@@ -1,6 +1,6 @@
 // Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
 (function () {
-  var LARGE = 1.5, NEAR = '400px', queue = [], library = null;
+  var LARGE = 1.5, NEAR = '400px', CELL = 29, BAR = 80, NOTABLE = 3, queue = [], library = null;
 
   // The library lies in the page compressed: it is unpacked once, after the page is there.
   function load() {
@@ -41,9 +41,21 @@
     return figure;
   }
 
+  // Numbers stand in the cells of a map where they fit; where they do not, the sign of what stands out, and all on hover.
+  function fitNumbers(figure, width) {
+    var room = width - figure.layout.margin.l - figure.layout.margin.r - BAR;
+    figure.data.forEach(function (trace) {
+      if (trace.type !== 'heatmap' || !trace.texttemplate || !(room / trace.x.length < CELL)) { return; }
+      trace.text = trace.text.map(function (row) {
+        return row.map(function (text) { return Math.abs(Number(text.replace('\u2212', '-'))) >= NOTABLE ? text.charAt(0) : ''; });
+      });
+    });
+  }
+
   function draw(place) {
     var figure = content(place), box = place.firstElementChild;
     box.style.height = figure.layout.height + 'px';
+    fitNumbers(figure, place.clientWidth * (window.innerWidth >= 2400 ? 1 / LARGE : 1));
     place.dataset.drawn = 'yes';
     Plotly.react(box, figure.data, figure.layout, FIGURE_CONFIG);
   }
@@ -81,6 +93,15 @@
     var place = button.closest('.switched').querySelector('.figure');
     place.dataset.show = button.dataset.show;
     if (place.dataset.drawn) { draw(place); }
+  });
+  var later = 0, width = window.innerWidth;
+  window.addEventListener('resize', function () {
+    clearTimeout(later);
+    later = setTimeout(function () {
+      if (!window.Plotly || window.innerWidth === width) { return; }
+      width = window.innerWidth;
+      all().filter(function (p) { return p.dataset.drawn && p.querySelector('.heatmaplayer'); }).forEach(draw);
+    }, 200);
   });
   window.addEventListener('sdimu-theme', function () {
     if (window.Plotly) { all().filter(function (p) { return p.dataset.drawn; }).forEach(draw); }

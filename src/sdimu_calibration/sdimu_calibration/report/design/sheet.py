@@ -66,7 +66,7 @@ def document(
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><script>{EARLY}</script><style>{STYLE}{style}</style></head><body>\n"
         '<a class="skip" href="#main">To the content</a>'
-        f'<header class="bar"><h1>{escape(title)}</h1><span class="quiet grow">{under}</span>{THEME_BUTTON}</header>\n'
+        f'<header class="bar"><h1>{escape(title)}</h1><span class="about grow">{under}</span>{THEME_BUTTON}</header>\n'
         f'<div class="frame">{nav}<main id="main">\n{body}\n</main></div>\n'
         f"<script>{SCRIPT}{script}</script>{drawn}</body></html>\n"
     )

@@ -63,7 +63,9 @@ def write_page(
         Of one unit: with its coefficients, the hashes of its recordings and room for signatures.
     """
     imu = entries[0].result.origin.imu or "IMU"
-    title = f"Calibration certificate: {imu}, {about.serial}" if certificate else f"Data sheet: {imu}"
+    units = list(dict.fromkeys(entry.unit for entry in entries))
+    of = about.serial or (units[0] if len(units) == 1 else f"{len(units)} units")
+    title = f"{'Calibration certificate' if certificate else 'Data sheet'}: {imu}, {of}"
     parts = [
         _table(lines),
         _coefficients(entries) if certificate else "",
@@ -103,7 +105,7 @@ def _conditions(lines: Sequence[Line]) -> str:
 def _verdict(lines: Sequence[Line]) -> str:
     judged = [line for line in lines if line.verdict]
     if not judged:
-        return ""
+        return quiet("No limits were stated, so nothing passes or fails: --limits FILE holds the lines against them.")
     failed = [line.term for line in judged if line.verdict == FAIL]
     open_ = [line.term for line in judged if line.verdict not in {PASS, FAIL}]
     if failed:

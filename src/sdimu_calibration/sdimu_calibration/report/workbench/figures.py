@@ -20,6 +20,8 @@ HEIGHT = 306
 """Height of a figure (px): two rows of them and the bar fit on a screen of 900."""
 _CELL = 10
 """Size of the numbers in the cells (px): with it those of 19 stops stand beside each other."""
+_MOST_NUMBERED = 22
+"""Number of stops whose numbers stand beside each other in the column of the heat map on a screen of 1440."""
 _MOST_BARS = 14
 _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 
@@ -37,6 +39,10 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
         fillcolor="rgba(0, 0, 0, 0)",
         line={"color": BEFORE, "width": 3},
     )
+    if len(grid.stops) > _MOST_NUMBERED:
+        # Numbers would run into each other: the sign of what stands out, the number under the mouse.
+        signs = [[evidence_figures.sign(value) for value in row] for row in grid.value]
+        figure.data[0] |= {"text": signs}
     # Colours repeat what the numbers say: their scale would take the room of three stops.
     figure.data[0] |= {"showscale": False, "textfont": {"size": _CELL}}
     figure.layout |= {"height": HEIGHT, "margin": _SHORT | {"l": 80}}

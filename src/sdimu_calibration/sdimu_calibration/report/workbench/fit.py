@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
@@ -34,11 +35,13 @@ from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
 from sdimu_calibration.report.workbench.setting import Setting
+from sdimu_calibration.storage.files.verdict_words import headline
 
 Tell = Callable[[str, float], None]
 _MOST_KEPT = 200
@@ -99,6 +102,8 @@ class Missing:
         Size of the score that pure noise reaches.
     held_out : float or None
         Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
+    mended : bool
+        Effects were found, and the model with them explains the recording.
     probabilities : Probabilities or None
         Of nothing, and of each family of effects, as `sdimu diagnose` has them.
     unknown : tuple of UnknownFunction
@@ -113,6 +118,7 @@ class Missing:
     held_out: float | None
     probabilities: Probabilities | None = None
     unknown: tuple[UnknownFunction, ...] = ()
+    mended: bool = False
 
 
 @dataclass(frozen=True)
@@ -165,15 +171,17 @@ class FitSession:
             if setting not in self._missing:
                 scores = self._survey(setting, tell)
                 told = climb(scores.fit, progress=tell)
+                summary = summarise(told)
                 found = Missing(
                     tuple(data.scored(scores)),
                     scores.found.threshold,
                     told.adequate,
-                    told.sentence,
+                    headline(summary),
                     scores.free_inputs_after,
                     scores.fit.held_out_rms(),
                     told.probabilities,
                     unknown_of(told),
+                    bool(summary.candidates) and told.verdict != Verdict.DATA_FAULT,
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]

@@ -60,6 +60,30 @@
     }
     if (KEYS[key]) { event.preventDefault(); KEYS[key](); }
   });
+  // A row of the table of coefficients fills the controls above it.
+  document.addEventListener('click', function (event) {
+    var row = event.target.closest && event.target.closest('tr[data-coefficient]');
+    if (!row) { return; }
+    set('coefficient', {value: row.dataset.coefficient});
+    document.querySelectorAll('tr[data-coefficient]').forEach(function (other) { other.classList.toggle('here', other === row); });
+    setTimeout(function () { if (at('mean')) { at('mean').focus(); } }, 0);
+  });
+
+  // What the server does is said on the card that asked for it, too.
+  var asked = null;
+  document.addEventListener('click', function (event) {
+    asked = event.target.closest ? event.target.closest('.card') || asked : asked;
+  }, true);
+  function working() {
+    var busy = at('busy'), words = busy && !busy.hidden ? busy.textContent.trim() : '';
+    document.querySelectorAll('.card[data-working]').forEach(function (card) {
+      if (card !== asked || !words) { delete card.dataset.working; }
+    });
+    if (asked && words && asked.dataset.working !== words) { asked.dataset.working = words; }
+    if (!words && asked && !asked.isConnected) { asked = null; }
+  }
+  setInterval(working, 200);
+
   document.addEventListener('click', function (event) {
     if (event.target.id === 'help-open') { KEYS['?'](); }
     if (event.target.id === 'help-close') { at('help').hidden = true; }

@@ -40,7 +40,7 @@ def options(entries: Sequence[data.Scored]) -> list[dict[str, str]]:
 def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     """Return the verdict in one line, and its class: a tick only where nothing speaks against the model."""
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
-    if missing.adequate and objections:
+    if missing.mended or (missing.adequate and objections):
         mark, tone = "\N{WARNING SIGN}", "doubtful"
     return f"{mark} {missing.sentence}", f"verdict {tone}"
 
@@ -73,11 +73,7 @@ def numbers(fitted: Fitted, given: Fitted) -> str:
     """Return how well a fit predicts, in one line."""
     fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
     held = "" if fitted.at_held is None else f"; of what is left out {fitted.at_held:.3f}"
-    nis = fitted.calibration.fit["nis_mean"]
-    errors = (
-        f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}; mean squared innovation {nis:.3f}. "
-        "1 is right."
-    )
+    errors = f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}; 1 is right."
     return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
 
 

@@ -33,6 +33,25 @@ def register(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     _show_states(app, shelf, doing)
     _draw(app, shelf, doing)
     _show_progress(app, doing)
+    _fill_controls(app, shelf)
+
+
+def _fill_controls(app: Dash, shelf: RecordingCache) -> None:
+    """Put estimate and sigma of the coefficient that is chosen into the controls of its prior."""
+
+    @app.callback(
+        Output("mean", "value"),
+        Output("sigma", "value"),
+        Input("coefficient", "value"),
+        Kept("shown", "data"),
+        prevent_initial_call=True,
+    )
+    def fill(name: str | None, kept: Any) -> tuple[Any, Any]:
+        if not name or not kept:
+            return no_update, no_update
+        now = from_json(kept)
+        fitted = shelf.bench(now.recording).known(now.now)
+        return (no_update, no_update) if fitted is None else tables.edited(fitted, name)
 
 
 def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:

@@ -79,9 +79,8 @@ def _fix(now: State, controls: Controls) -> State:
 
 
 def _set_prior(now: State, controls: Controls) -> State:
-    return now.then(
-        now.now.with_prior(_coefficient(controls), _quantity(controls, "mean"), _quantity(controls, "sigma"))
-    )
+    mean = _quantity(controls, "mean")
+    return now.then(now.now.with_prior(_coefficient(controls), mean, _sigma(controls, mean)))
 
 
 def _free(now: State, controls: Controls) -> State:
@@ -100,6 +99,12 @@ def _quantity(controls: Controls, name: str) -> str:
     if not text:
         raise DataError(f"{name}: write a quantity with its unit, such as 1.5 deg/h")
     return text
+
+
+def _sigma(controls: Controls, mean: str) -> str:
+    """Text of a sigma; a bare number has the unit of the value."""
+    text = _quantity(controls, "sigma")
+    return text if " " in text else f"{text} {mean.partition(' ')[2]}".strip()
 
 
 def _open(now: State, controls: Controls) -> State:

@@ -82,6 +82,19 @@ def _is_zero(quantity: str) -> bool:
     return parse_quantity(quantity, quantity.partition(" ")[2] or "1") == 0.0
 
 
+def edited(now: Fitted, name: str) -> tuple[str, str]:
+    """Estimate and sigma of a coefficient with their unit, as the controls of a prior take them; empty if unknown."""
+    here = now.calibration
+    if name not in here.names:
+        return "", ""
+    k = here.names.index(name)
+    unit = here.display_units[k]
+    value, sigma = from_si(float(here.values[k]), unit), from_si(float(np.sqrt(here.covariance[k, k])), unit)
+    if not sigma > 0.0:
+        return f"{value:.6g} {unit}", f"{from_si(float(now.prior[k]), unit):.3g} {unit}"
+    return f"{as_far([value], sigma)[0]} {unit}", f"{sigma:.2g} {unit}"
+
+
 def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
     """Table of all coefficients: value, sigma and prior, and how far each moved against the model as given."""
     first, here = given.calibration, now.calibration
@@ -104,5 +117,13 @@ def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
         state = "fixed" if now.prior[k] == 0.0 else "by the frame" if not sigma[k] > 0.0 else "free"
         shown = f"{mean:.4g} \N{PLUS-MINUS SIGN} {prior:.4g}" if mean else f"\N{PLUS-MINUS SIGN} {prior:.4g}"
         cells = [name, *numbers, unit, shown, f"{state}, own prior" if name in changed and state == "free" else state]
-        rows.append(html.Tr([html.Td(text) for text in (*cells, before, moved)]))
+        rows.append(
+            html.Tr(
+                [
+                    html.Td(html.Button(name, className="row", title="edit it")),
+                    *map(html.Td, (*cells[1:], before, moved)),
+                ],
+                **{"data-coefficient": name},
+            )
+        )
     return html.Table([html.Thead(html.Tr([html.Th(word) for word in headings])), html.Tbody(rows)])

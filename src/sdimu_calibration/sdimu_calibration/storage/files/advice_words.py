@@ -100,11 +100,11 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.TRY_EQUATION: lambda *labels: (
         f"Try an equation of your own (--try FILE); nearest in this test: {', '.join(labels)}."
     ),
-    Kind.KEEP: lambda label: f"Keep {label or 'what was found'} in the model",
+    Kind.KEEP: lambda label: f"Calibrate with {label or 'what was found'} in the model",
     Kind.TRY: lambda label: (
-        f"{label} is likely, not certain: record more before it is kept; what it changes"
+        f"Which effect it is stays open, {label} is the likeliest: record more before it is kept; what it changes"
         if label
-        else "Some are likely, not certain: record more before they are kept; what they change"
+        else "Of some it stays open which effect it is: record more before they are kept; what they change"
     ),
     Kind.CORRECT_LATITUDE: _latitude,
     Kind.RECORD_AGAIN: lambda label: f"{label} is a fault of this recording: record again and do not carry it over.",

@@ -140,15 +140,26 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     if isinstance(name_or_path, Path) or _is_path(text):
         if path.is_file():
             return path
-        raise DataError(
-            f"{path}: is a folder, and no {kind} file: name one" if path.is_dir() else f"{path}: no such {kind} file"
-        )
+        if path.is_dir():
+            raise DataError(f"{path}: is a folder; name {_file_in(path, kind)}, or one of: {', '.join(_known(kind))}")
+        raise DataError(f"{path}: no such {kind} file")
     folder = config_folder() / kind
     for suffix in _SUFFIXES:
         if (folder / f"{text}{suffix}").is_file():
             return folder / f"{text}{suffix}"
-    known = sorted(p.stem for p in folder.glob("*") if p.suffix in _SUFFIXES)
+    known = _known(kind)
     raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
+
+
+def _known(kind: str) -> list[str]:
+    """Names in a folder of the configuration."""
+    return sorted(p.stem for p in (config_folder() / kind).glob("*") if p.suffix in _SUFFIXES)
+
+
+def _file_in(folder: Path, kind: str) -> str:
+    """Say which file of a folder is meant: the only one that it may be, else that it is a YAML file."""
+    files = sorted(p for p in folder.glob("*") if p.suffix in _SUFFIXES)
+    return f"the {kind} file in it ({files[0]})" if len(files) == 1 else f"a YAML file of kind {kind}"
 
 
 def _is_path(text: str) -> bool:

@@ -1,0 +1,130 @@
+"""What it costs to ignore a missing effect: metres of a navigation without aid, and coefficients that are wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.estimation.free_inertial import NOTHING
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.report_extras import ReportExtras
+
+_KILOMETRE = 1000.0
+_WHOLE_M = 10.0
+"""Distance (m) from which metres have no decimals: a tenth of less is still seen."""
+
+
+@dataclass(frozen=True)
+class Off:
+    """A coefficient that is wrong while an effect is missing.
+
+    Attributes
+    ----------
+    name : str
+    amount : float
+        By how much it is too large, in `unit`.
+    unit : str
+    sigmas : float
+        The same over the sigma that it is given with.
+    """
+
+    name: str
+    amount: float
+    unit: str
+    sigmas: float
+
+    @property
+    def text(self) -> str:
+        """In words: ``gyro_scale_y +26.2 ppm (5.5 of its sigmas)``."""
+        return f"{self.name} {self.amount:+.3g} {self.unit} ({abs(self.sigmas):.1f} of its sigmas)"
+
+
+def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]:
+    """Coefficients of a result that a better one puts elsewhere by more than chance, the worst first."""
+    units = dict(zip(before.names, before.display_units, strict=True))
+    at = {name: k for k, name in enumerate(before.names)}
+    out = []
+    for name, sigmas in moved_coefficients(before, after):
+        size = float(np.sqrt(before.covariance[at[name], at[name]]))
+        out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], -sigmas))
+    return tuple(out)
+
+
+def wrong_without(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[Off, ...]:
+    """Coefficients that are wrong without what was found, as a calibration delivers them, the worst first."""
+    d = summary.diagnosis
+    if not summary.found:
+        return ()
+    given = more.given if more is not None and more.given is not None else d.before
+    return coefficients_off(given, d.after)
+
+
+@dataclass(frozen=True)
+class InUse:
+    """How far a navigation without aid drifts with each compensation, over all stretches that no fit has seen.
+
+    Attributes
+    ----------
+    minutes : float
+        Length of a navigation.
+    stretches : int
+    names : tuple of str
+        Of the compensations, the worst model first.
+    distance : tuple of float
+        Root mean square of the error of position at the end of the stretches (m), one a compensation.
+    """
+
+    minutes: float
+    stretches: int
+    names: tuple[str, ...]
+    distance: tuple[float, ...]
+
+    @property
+    def figures(self) -> str:
+        """The distances one after the other: ``2.0 km -> 52 m -> 48 m``."""
+        return in_metres(self.distance)
+
+    @property
+    def where(self) -> str:
+        """Over how many stretches, and how they are summed up."""
+        return "a stretch" if self.stretches == 1 else f"{self.stretches} stretches (root mean square)"
+
+    @property
+    def words(self) -> str:
+        """What the distances are, and of which compensations."""
+        return (
+            f"position after {self.minutes:.0f} min without aid, over {self.where} that no fit has seen: "
+            f"{', '.join(self.names)}"
+        )
+
+
+def in_use(more: ReportExtras | None) -> InUse | None:
+    """Sum up the navigations without aid; None where there is none."""
+    trials = more.trials if more is not None else ()
+    if not trials:
+        return None
+    ends = np.array([[float(drift.distance[-1]) for drift in trial.drifts] for trial in trials])
+    names = tuple("not compensated" if drift.name == NOTHING else drift.name for drift in trials[0].drifts)
+    minutes = float(np.mean([trial.segment.length_s for trial in trials])) / 60.0
+    return InUse(minutes, len(trials), names, tuple(np.sqrt(np.mean(ends**2, axis=0)).tolist()))
+
+
+def in_metres(values: Sequence[float]) -> str:
+    """Write distances (m) one after the other: ``543 -> 105 -> 55 m``; large ones in km."""
+    if any(value >= _KILOMETRE for value in values):
+        return " -> ".join(metres(value) for value in values)
+    return f"{' -> '.join(_number(value) for value in values)} m"
+
+
+def metres(value: float) -> str:
+    """Write a distance (m): ``55 m``, ``3.2 km``."""
+    return f"{_number(value / _KILOMETRE)} km" if value >= _KILOMETRE else f"{_number(value)} m"
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if value >= _WHOLE_M else f"{value:.1f}"

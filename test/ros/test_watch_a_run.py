@@ -1,0 +1,51 @@
+"""`sdimu watch` beside `sdimu run`: finds its domain, joins late, has the figures of the run, ends with it, adds."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+
+import pytest
+
+from sdimu_calibration.storage.files.result_file import read_result
+
+from .conftest import DEADLINE_S, sdimu, write_plan
+
+pytestmark = pytest.mark.ros
+EFFECT = "gyro_scale_asymmetry_y"
+
+
+def told(text: str, stop: int) -> tuple[str, str]:
+    """Place and time of the test, and the first sigma, in the line of a stop."""
+    (line,) = (line for line in text.splitlines() if line.startswith(f"stop {stop} "))
+    place, when, sigma, *_ = line.split("; ")
+    return f"{place}; {when.partition(',')[0]}", sigma
+
+
+def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Locks of this test alone: other runs on this machine are not meant.
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    plan = write_plan(tmp_path / "plan.yaml", 40.0)
+    run = sdimu("run", "--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--out", tmp_path / "run")
+    watch = None
+    try:
+        begun = time.monotonic()
+        while not (tmp_path / "run" / "log" / "calibration.log").exists():
+            assert time.monotonic() - begun < DEADLINE_S
+            time.sleep(0.2)
+        watch = sdimu("watch", "--add", EFFECT)
+        seen, wrong = watch.communicate(timeout=DEADLINE_S)
+        assert (watch.returncode, wrong) == (0, "")
+        done, err = run.communicate(timeout=DEADLINE_S)
+        assert run.returncode in (0, 3), err
+    finally:
+        for process in (run, watch):
+            if process is not None:
+                process.kill()
+    assert f"the run into {tmp_path / 'run'}" in seen
+    assert "the test has ended" in seen
+    for stop in (1, 2):
+        one, other = (re.sub(r"\d+ of", "of", told(text, stop)[0]) for text in (done, seen))
+        assert one == other
+    assert read_result(tmp_path / "run").names[-1] == EFFECT

@@ -1,0 +1,106 @@
+"""What a user reads in passing: the catalogue in a pipe, help, paragraphs of a narrow window, files of parameters."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from sdimu_calibration.cli import main as cli
+from sdimu_calibration.cli.console import plain, say
+from sdimu_calibration.cli.processes import Children
+from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.noise import TERMS, Terms
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.live_text import size
+from sdimu_calibration.report.noise import rows
+from sdimu_calibration.storage.files.config import find_config
+
+
+@pytest.fixture
+def sdimu(monkeypatch, capsys):
+    """Run `sdimu` in this process, in a pipe; return stdout."""
+
+    def run(*arguments: str) -> str:
+        monkeypatch.setattr("sys.argv", ["sdimu", *arguments])
+        monkeypatch.setenv("COLUMNS", "100")
+        with pytest.raises(SystemExit):
+            cli.main()
+        return str(capsys.readouterr().out)
+
+    return run
+
+
+def test_the_catalogue_in_a_pipe_says_that_a_number_counts_coefficients(sdimu):
+    out = sdimu("effects").splitlines()
+    assert "  gyro_bias: 3 coefficients in deg/h" in out
+    assert out[out.index("  gyro_bias: 3 coefficients in deg/h") + 1].startswith("    dw_i = ")
+
+
+@pytest.mark.parametrize("verb", [(), ("run",), ("bag", "cut"), ("calibrate",)])
+def test_help_names_no_type_beside_an_option_that_takes_no_value(sdimu, verb):
+    out = sdimu(*verb, "--help")
+    assert "--help" in out
+    assert "<bool>" not in out
+
+
+def test_a_line_keeps_the_spaces_that_say_it_belongs_to_the_one_above(capsys):
+    say(plain(width=60), "  below")
+    assert capsys.readouterr().out == "  below\n"
+
+
+def test_a_table_too_wide_for_the_window_becomes_paragraphs_with_their_texts_below_each_other(capsys):
+    print_table(plain(width=30), ("folder", "nis", "held-out"), [["one", "1.0", "x" * 40]])
+    _, first, second = capsys.readouterr().out.splitlines()
+    assert first.index("1.0") == second.index("x")
+
+
+@pytest.mark.parametrize("name", ["y", "2024", "on", "1e3", "~"])
+def test_any_name_of_a_folder_reaches_a_node_as_a_text(tmp_path, name, monkeypatch):
+    monkeypatch.setattr(Children, "run", lambda *_: None)
+    Children(tmp_path).start("node", "module", {"out": name, "diagnose": True, "rate": 50.0})
+    text = (tmp_path / "node.yaml").read_text()
+    # ROS reads YAML 1.1 with its own parser, to which only quotes say text.
+    assert f'"out": "{name}"' in text
+    assert yaml.safe_load(text)["node"]["ros__parameters"] == {"out": name, "diagnose": True, "rate": 50.0}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    estimate: float
+    sigma: float
+    display_unit: str
+
+
+def test_what_the_turns_so_far_do_not_show_has_no_size():
+    assert size(Ranked(3.5e3, 4.0e3, "ug/g^2")) == "size not seen yet"
+    assert size(Ranked(to_si(20.0, "ug/g^2"), to_si(1.0, "ug/g^2"), "ug/g^2")).startswith("20.0 ")
+
+
+def test_white_noise_is_told_in_both_customs():
+    seen = np.array([term == "white" for term in TERMS])
+    value = np.where(seen, to_si(0.6, "deg/h/sqrt(Hz)"), np.nan)
+    terms = Terms(np.nan_to_num(value), np.full(len(TERMS), 0.1 * np.nanmax(value)))
+    (white,) = (row for row in rows({"gyro_x": terms}) if row[1] == "white noise")
+    assert white[-1] == "deg/h/sqrt(Hz) = 0.01 deg/sqrt(h)"
+
+
+def test_a_folder_in_the_place_of_a_file_says_which_files_there_are(tmp_path):
+    with pytest.raises(DataError, match="is a folder; name a YAML file of kind imu") as told:
+        find_config("imu", tmp_path)
+    assert "dtg" in str(told.value)
+    (tmp_path / "imu.yaml").touch()
+    with pytest.raises(DataError, match=re.escape(str(tmp_path / "imu.yaml"))):
+        find_config("imu", tmp_path)
+
+
+def test_the_readme_states_the_least_python_of_the_packages():
+    root = Path(__file__).parents[3]
+    (least,) = re.findall(r"Python (3\.\d+) to", (root / "README.md").read_text())
+    for setup in [*root.glob("src/*/setup.py"), root / "study" / "setup.py"]:
+        assert f'python_requires=">={least}"' in setup.read_text(), setup

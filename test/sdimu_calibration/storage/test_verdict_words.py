@@ -1,0 +1,103 @@
+"""The sentence of a diagnosis: what is certain, what is likely, what is open, and the advice that goes with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
+from sdimu_calibration.core.posterior.family import family_of
+from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report import first_screen
+from sdimu_calibration.storage.files.verdict_words import _grade, headline, named, size_of
+
+
+@pytest.fixture(scope="module")
+def summary(diagnosis: Diagnosis) -> DiagnosisSummary:
+    return summarise(diagnosis)
+
+
+def with_shares(summary, probability, *shares):
+    """The summary as if its effect, or one of its class, had that probability."""
+    (one,) = summary.found
+    told = replace(one, probability=probability, of_family=0.0, may_be=tuple(Share(*share) for share in shares))
+    return replace(summary, found=(told,))
+
+
+def own(summary):
+    return summary.found[0].candidate.coefficient
+
+
+def test_what_is_certain_is_told_with_its_size(summary):
+    told = headline(with_shares(summary, 0.999, (own(summary), 0.999)))
+    (one,) = summary.found
+    assert told == f"Certain: accelerometer second-order nonlinearity K2, x ({size_of(one)})."
+
+
+def test_a_class_that_is_certain_says_which_member_is_open_each_with_its_probability(summary):
+    told = headline(with_shares(summary, 0.995, (own(summary), 0.82), ("accel_cubic_x", 0.18)))
+    assert told.startswith("Certain, but open which: accelerometer second-order nonlinearity K2, x (")
+    assert told.endswith(f") 82 % or {named('accel_cubic_x')} 18 %.")
+
+
+def test_what_is_likely_says_how_likely(summary):
+    told = headline(with_shares(summary, 0.9, (own(summary), 0.9)))
+    assert told.startswith("Likely (90 %): ")
+    assert "ertain" not in told
+
+
+def test_what_is_not_probable_enough_to_be_named_leaves_nothing_open(summary):
+    told = headline(with_shares(summary, 0.999, (own(summary), 0.97), ("accel_cubic_x", 0.03)))
+    assert told.startswith("Certain: ")
+
+
+def test_the_sentence_has_no_error_of_another_place(summary):
+    assert "held out" in summary.diagnosis.sentence
+    assert "held out" not in headline(summary)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "adequate", "tone"),
+    [(Verdict.UNEXPLAINED, False, "bad"), (Verdict.DATA_FAULT, False, "bad"), (Verdict.ONE_EFFECT, False, "doubtful")],
+)
+def test_red_is_for_what_no_effect_mends(summary, verdict, adequate, tone):
+    """With what was found the page is right: its errors are near 1, and red above them would deny it."""
+    found = replace(summary, diagnosis=replace(summary.diagnosis, verdict=verdict, adequate=adequate))
+    assert first_screen.of_diagnosis(found).tone == tone
+
+
+def test_green_needs_an_error_near_one(summary):
+    d = summary.diagnosis
+    none = d.found.chosen[:0]
+    clean = replace(d, verdict=Verdict.CONSISTENT, adequate=True, found=replace(d.found, chosen=none, steps=()))
+    for error, tone in ((1.0, "good"), (1.25, "doubtful")):
+        after = replace(clean.after, fit={**clean.after.fit, "held_out_rms": error}, warnings=())
+        told = replace(summary, found=(), diagnosis=replace(clean, before=after, after=after))
+        assert first_screen.of_diagnosis(told).tone == tone
+
+
+def test_a_family_surer_than_the_class_is_told_with_its_members_each_once_by_one_figure(summary):
+    (one,) = summary.found
+    family, sensor = family_of(one.candidate)
+    members = [
+        MemberShare(label, p, 1.0, 0.1, "1", "ppm")
+        for label, p in (
+            (one.candidate.label, 0.5),
+            ("accel_cubic_x", 0.1),
+            ("accel_scale_x(tau=1 s)", 0.15),
+            ("accel_scale_x(tau=2 s)", 0.15),
+        )
+    ]
+    told = Probabilities(0.0, (FamilyShare(family, sensor, 0.97, tuple(members)),), ())
+    shares = (Share(own(summary), 0.5), Share("accel_scale_x", 0.28))
+    found = replace(one, probability=0.6, of_family=0.97, may_be=shares)
+    graded_ = _grade(found, told)
+    assert graded_.probability == 0.97
+    assert [(s.name, s.probability) for s in graded_.may_be] == [
+        (own(summary), 0.5),
+        ("accel_scale_x", 0.28),
+        ("accel_cubic_x", 0.1),
+    ]
