@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiers import is_thorough
+from tiers import COLLECTED, is_thorough
 
 from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
@@ -32,8 +32,10 @@ os.environ["ROS_DOMAIN_ID"] = str(40 + _WORKER % 60)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what `make test` leaves to `.ci/run`."""
+    config.stash[COLLECTED] = [item.nodeid for item in items]
     for item in items:
         if is_thorough(item.nodeid, over_dds=item.get_closest_marker("ros") is not None):
             item.add_marker("thorough")
@@ -162,12 +164,13 @@ ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
 
 @pytest.fixture(scope="session")
 def recording() -> Recording:
-    """With 40 ug/g^2, forty times what this plan sees at one sigma."""
+    """With 40 ug/g^2, thirty times what this plan sees at one sigma in stops of a minute."""
     # The tests of the table run where the simulated IMU is not installed.
     from sdimu_sim.core.scenario import Scenario, generate
 
+    plan = load_plan("kim18")
     scenario = Scenario(
-        load_plan("kim18"),
+        replace(plan, dwell_s=(60.0,) * len(plan.dwell_s)),
         load_imu("dtg"),
         load_site("daejeon"),
         TableSpecification(axes=None),

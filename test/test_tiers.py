@@ -7,14 +7,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from tiers import LONG, QUICK_ROS, THOROUGH, is_thorough, names
+from mutants import CORE, MUTANTS
+from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="module")
-def collected() -> list[str]:
-    """Names of all tests in the files and folders of the table, as pytest prints them."""
+def collected(request: pytest.FixtureRequest) -> list[str]:
+    """Names of all tests in the files and folders of the table, as pytest prints them: of this run, if it is whole."""
+    if {Path(name).resolve() for name in request.config.args} & {ROOT, ROOT / "test"}:
+        return request.config.stash[COLLECTED]
     files = sorted({row.partition("::")[0] for row in (*THOROUGH, *LONG, *QUICK_ROS)})
     command = [sys.executable, "-m", "pytest", "--collect-only", "-p", "no:xdist", "-p", "no:warnings", *files]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -44,7 +47,22 @@ def test_a_test_over_dds_is_thorough_unless_the_table_keeps_it():
 def test_what_make_test_leaves_out_is_run_by_ci_and_decides_there():
     ci, make = ((ROOT / name).read_text() for name in (".ci/run", "Makefile"))
     assert '-m "not thorough and not slow and not bench"' in make
-    assert '-m "thorough and not slow and not bench"' in make
-    for target in ("test", "colcon", "docs", "thorough", "other-blas"):
+    assert '-m "thorough and ros and not slow and not bench"' in make
+    assert '-m "thorough and not ros and not slow and not bench"' in make
+    for line in ("make test", "make -j 2 colcon docs", "make thorough", "make other-blas"):
         # Alone on its line: nothing takes its failure away.
-        assert f"\nmake {target}\n" in ci
+        assert f"\n{line}\n" in ci
+
+
+def test_what_thorough_leaves_to_one_kernel_of_linear_algebra_it_runs_with_the_other():
+    make = (ROOT / "Makefile").read_text()
+    assert "\nthorough: export OPENBLAS_CORETYPE = Haswell\n" in make
+    haswell, nehalem = make.split("\nother-blas: setup\n")[1].split("OPENBLAS_CORETYPE=")[1:3]
+    assert '-m "not thorough and not slow and not bench"' in haswell
+    assert '-m "not slow and not bench"' in nehalem
+
+
+def test_every_mutant_is_one_place_of_the_core():
+    for mutant in MUTANTS:
+        assert (CORE / mutant.file).read_text().count(mutant.right) == 1, mutant.file
+        assert all((ROOT / name).exists() for name in mutant.tests), mutant.file

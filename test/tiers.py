@@ -5,6 +5,11 @@ Everything else runs in both. A row that names nothing fails test_tiers.py.
 
 from __future__ import annotations
 
+import pytest
+
+COLLECTED = pytest.StashKey[list[str]]()
+"""Names of all tests that a run has found, those too that it then leaves out."""
+
 THOROUGH = {
     "test/book/test_blocks.py": "runs README and tutorials as they stand",
     "test/browser": "drives Chromium",
@@ -75,6 +80,7 @@ LONG = {
         "test_an_effect_in_flicker_noise_is_named_and_the_noise_is_not",
     ),
     "test/sdimu_calibration/core/diagnosis/test_families.py": (
+        "test_a_delay_of_a_gyro_and_its_sensitivity_to_angular_acceleration_are_one_find",
         "test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing_all_the_same",
     ),
     "test/sdimu_calibration/core/diagnosis/test_handheld_diagnosis.py": (
@@ -89,6 +95,7 @@ LONG = {
         "test_a_result_is_written_read_compensated_and_exported[mems_industrial second-order]",
         "test_every_caller_gives_the_same_digits[fog_tactical]",
         "test_every_caller_gives_the_same_digits[mems_consumer]",
+        "test_every_caller_gives_the_same_digits[mems_industrial]",
         "test_every_caller_gives_the_same_digits[rlg_navigation]",
     ),
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py": (
@@ -100,6 +107,7 @@ LONG = {
         "test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction[mems_industrial-table_test-second-order]",
     ),
     "test/sdimu_calibration/core/estimation/test_uncertain_site.py": (
+        "test_a_hidden_effect_is_named_beside_a_site_that_is_off",
         "test_a_run_by_hand_takes_the_gravity_of_its_site_with_its_sigma",
         "test_coefficients_are_honest_at_a_site_that_is_off_by_what_it_states[second-order]",
     ),
@@ -184,7 +192,10 @@ LONG = {
 row is the whole file."""
 
 QUICK_ROS = (
-    "test/ros/test_whole_run.py",
+    "test/ros/test_whole_run.py::test_a_run_loses_nothing",
+    "test/ros/test_whole_run.py::test_a_run_leaves_bag_result_report_and_truth",
+    "test/ros/test_whole_run.py::test_live_estimates_come_once_a_second_of_data",
+    "test/ros/test_whole_run.py::test_the_last_live_result_is_the_offline_one",
     "test/ros/test_robustness.py::test_a_node_that_fails_is_reported_in_one_line",
     "test/ros/test_sockets.py::test_the_sockets_of_a_domain_are_bound_to_the_loopback_interface",
 )

@@ -96,25 +96,29 @@ def sdimu(*arguments: object) -> subprocess.Popen[str]:
 
 
 @dataclass
-class Twins:
-    """Two runs of the same test at the same time."""
+class Run:
+    """A whole test that has been run, and what it said."""
 
-    folders: tuple[Path, Path]
-    outputs: tuple[str, str]
+    folder: Path
+    output: str
 
 
-@pytest.fixture(scope="session")
-def twins(tmp_path_factory: pytest.TempPathFactory) -> Twins:
-    root = tmp_path_factory.mktemp("twins")
+def runs(root: Path, number: int) -> list[Run]:
+    """Run the same test several times at once."""
     plan = write_plan(root / "plan.yaml", DWELL_S)
-    folders = (root / "a", root / "b")
+    folders = [root / f"run{k}" for k in range(number)]
     processes = [sdimu("run", "--plan", plan, "--seed", 5, "--out", folder) for folder in folders]
-    outputs = []
-    for process in processes:
+    done = []
+    for folder, process in zip(folders, processes, strict=True):
         try:
             out, err = process.communicate(timeout=DEADLINE_S)
         finally:
             process.kill()
         assert process.returncode == 0, err
-        outputs.append(out)
-    return Twins(folders, (outputs[0], outputs[1]))
+        done.append(Run(folder, out))
+    return done
+
+
+@pytest.fixture(scope="session")
+def whole_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return runs(tmp_path_factory.mktemp("run"), 1)[0]

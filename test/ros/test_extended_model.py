@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import FitSession, write_plan
+
+pytestmark = pytest.mark.ros
 
 FILE = """format: sdimu-effect/1
 name: coupling

@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 
 from sdimu_calibration.storage.files.config import config_folder
 
-from .conftest import Twins
+from .conftest import Run
 
 pytestmark = pytest.mark.ros
 
@@ -24,9 +24,9 @@ _STEP = re.compile(r'\.(?P<field>\w+)|\[(?P<index>-?\d+|:)\]|\{(?P<key>\w+)==(?P
 
 
 @pytest.fixture(scope="module")
-def messages(twins: Twins) -> dict[str, list[Any]]:
+def messages(whole_run: Run) -> dict[str, list[Any]]:
     """Some hundred messages of every topic, spread over the run, the last ones included."""
-    return read(twins.folders[0] / "bag")
+    return read(whole_run.folder / "bag")
 
 
 def read(bag: Path) -> dict[str, list[Any]]:

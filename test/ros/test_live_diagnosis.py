@@ -8,9 +8,10 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,10 +25,8 @@ from std_msgs.msg import Float64MultiArray
 import sdimu_calibration
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import rounds
-from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.core.diagnosis.search import search
-from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
@@ -39,7 +38,7 @@ from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.files.diagnosis_file import odds
 from sdimu_calibration.storage.files.journal import Journal, digest
-from sdimu_calibration.storage.opening import Source, open_test, opening_options
+from sdimu_calibration.storage.opening import Source, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
 
 from .conftest import DEADLINE_S, sdimu
@@ -97,15 +96,31 @@ def bag(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return bag
 
 
-def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(whole, bag, monkeypatch):
+@dataclass
+class Notebook:
+    """A diagnosis of the bag in Python, and the searches that it made."""
+
+    opened: Any
+    diagnosis: Any
+    searches: list[Any]
+
+
+@pytest.fixture(scope="module")
+def notebook(bag: Path) -> Notebook:
     searches = []
 
     def seen(*arguments, **more):
         searches.append(search(*arguments, **more))
         return searches[-1]
 
-    monkeypatch.setattr(rounds, "search", seen)
-    climb(solve(open_test(bag, "daejeon", load_imu("dtg")), load_model("baseline")))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rounds, "search", seen)
+        opened = sdimu_calibration.open(bag, site="daejeon", imu="dtg")
+        return Notebook(opened, sdimu_calibration.diagnose(sdimu_calibration.calibrate(opened)).core, searches)
+
+
+def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(whole, notebook):
+    searches = notebook.searches
     evidence, first, limit = searches[0].evidence, searches[0].first, searches[0].threshold
     scanned = {
         evidence.names[k]: (first.z[k], first.estimate[k], first.sigma[k])
@@ -120,16 +135,14 @@ def test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag(whole, 
     assert whole.threshold == pytest.approx(limit, rel=0.01)
 
 
-def test_shell_notebook_workbench_and_the_live_end_tell_the_same_probabilities(whole, bag, tmp_path):
+def test_shell_notebook_workbench_and_the_live_end_tell_the_same_probabilities(whole, bag, notebook, tmp_path):
     """To the last digit."""
     shell = sdimu("diagnose", bag, "--site", "daejeon", "--imu", "dtg", "--out", tmp_path / "out")
     shell.communicate(timeout=DEADLINE_S)
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["probabilities"]
     assert told["families"][0]["p"] > 0.99
-    opened = sdimu_calibration.open(bag, site="daejeon", imu="dtg")
-    notebook = sdimu_calibration.diagnose(sdimu_calibration.calibrate(opened)).core
-    workbench = FitSession(opened, load_model("baseline")).missing(Setting())
-    for other in (notebook, workbench, whole):
+    workbench = FitSession(notebook.opened, load_model("baseline")).missing(Setting())
+    for other in (notebook.diagnosis, workbench, whole):
         assert json.loads(json.dumps(odds(other.probabilities), default=str).replace("NaN", "null")) == told
     live = {v.key: v.value for s in diagnosis(START, whole).status if s.name == "probabilities" for v in s.values}
     assert float(live["nothing_missing"]) == told["nothing_missing"]

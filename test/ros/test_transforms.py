@@ -18,7 +18,7 @@ from sdimu_calibration.nodes.transform_type import HASH, TYPE_NAME
 from sdimu_calibration.nodes.transforms import TransformMessage, about, stamp_of_first
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 
-from .conftest import DWELL_S, TURN_S, Twins
+from .conftest import DWELL_S, TURN_S, Run
 
 MOUNT_DEG = 3.0
 """The simulated IMU is mounted within this about each axis, and the transforms do not know it."""
@@ -69,8 +69,8 @@ def test_what_is_encoded_is_read_by_others() -> None:
 
 
 @pytest.mark.ros
-def test_transforms_lead_from_the_site_to_an_imu_that_feels_gravity_upwards(twins: Twins) -> None:
-    bag = twins.folders[0] / "bag"
+def test_transforms_lead_from_the_site_to_an_imu_that_feels_gravity_upwards(whole_run: Run) -> None:
+    bag = whole_run.folder / "bag"
     parent: dict[str, str] = {}
     turns: list[tuple[float, str, np.ndarray]] = []
     with AnyReader([bag]) as reader:

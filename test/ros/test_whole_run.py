@@ -15,7 +15,7 @@ from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import DEADLINE_S, DWELL_S, RATE_HZ, Twins, imu_stamps, samples_of, sdimu
+from .conftest import DEADLINE_S, DWELL_S, RATE_HZ, Run, imu_stamps, runs, samples_of, sdimu
 
 pytestmark = pytest.mark.ros
 
@@ -30,23 +30,23 @@ TYPES = {
 }
 
 
-def test_a_run_loses_nothing(twins: Twins) -> None:
-    stamps = imu_stamps(twins.folders[0] / "bag")
+def test_a_run_loses_nothing(whole_run: Run) -> None:
+    stamps = imu_stamps(whole_run.folder / "bag")
     assert len(stamps) == samples_of(DWELL_S)
     assert set(np.diff(stamps)) == {10**9 // RATE_HZ}
-    assert f"{len(stamps)} samples recorded, 0 lost" in " ".join(twins.outputs[0].split())
+    assert f"{len(stamps)} samples recorded, 0 lost" in " ".join(whole_run.output.split())
 
 
-def test_a_run_leaves_bag_result_report_and_truth(twins: Twins) -> None:
-    left = {path.name for path in twins.folders[0].iterdir()}
+def test_a_run_leaves_bag_result_report_and_truth(whole_run: Run) -> None:
+    left = {path.name for path in whole_run.folder.iterdir()}
     assert {"bag", "result.json", "report.html", "truth.yaml", "plan.yaml"} <= left
-    first = twins.folders[0]
+    first = whole_run.folder
     ran, written = (load_plan(str(folder / "plan.yaml")) for folder in (first.parent, first))
     assert (written.dwell_s, written.turns) == (ran.dwell_s, ran.turns)
 
 
-def test_two_runs_at_once_with_one_seed_record_the_same(twins: Twins) -> None:
-    first, second = (raw_messages(folder / "bag", TYPES, "/imu/data_raw") for folder in twins.folders)
+def test_two_runs_at_once_with_one_seed_record_the_same(tmp_path: Path) -> None:
+    first, second = (raw_messages(run.folder / "bag", TYPES, "/imu/data_raw") for run in runs(tmp_path, 2))
     assert first.keys() == TYPES.keys()
     for topic, type_name in TYPES.items():
         kind = message_class(type_name)
@@ -56,27 +56,27 @@ def test_two_runs_at_once_with_one_seed_record_the_same(twins: Twins) -> None:
         assert not differ, topic
 
 
-def test_live_estimates_come_once_a_second_of_data(twins: Twins) -> None:
-    found = raw_messages(twins.folders[0] / "bag", TYPES, "/imu/data_raw")
+def test_live_estimates_come_once_a_second_of_data(whole_run: Run) -> None:
+    found = raw_messages(whole_run.folder / "bag", TYPES, "/imu/data_raw")
     seconds = samples_of(DWELL_S) // RATE_HZ
     assert len(found["/diagnostics"]) == seconds
     # The last word, from all passes over the whole test, comes on top.
     assert len(found["/calibration/coefficients"]) == len(found["/calibration/covariance"]) == seconds + 1
 
 
-def test_the_last_live_result_is_the_offline_one(twins: Twins) -> None:
-    live = read_result(twins.folders[0] / "result.json")
-    recording = read_recording(twins.folders[0] / "bag")
+def test_the_last_live_result_is_the_offline_one(whole_run: Run) -> None:
+    live = read_result(whole_run.folder / "result.json")
+    recording = read_recording(whole_run.folder / "bag")
     offline = calibrate(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
     np.testing.assert_array_equal(live.values, offline.values)
     np.testing.assert_array_equal(live.covariance, offline.covariance)
 
 
-def test_replay_gives_the_same_result(twins: Twins, tmp_path: Path) -> None:
-    process = sdimu("replay", twins.folders[0] / "bag", "--out", tmp_path / "replay", "--patience", DEADLINE_S)
+def test_replay_gives_the_same_result(whole_run: Run, tmp_path: Path) -> None:
+    process = sdimu("replay", whole_run.folder / "bag", "--out", tmp_path / "replay", "--patience", DEADLINE_S)
     _, err = process.communicate(timeout=DEADLINE_S + 10.0)
     assert process.returncode == 0, err
-    live, again = read_result(twins.folders[0] / "result.json"), read_result(tmp_path / "replay" / "result.json")
+    live, again = read_result(whole_run.folder / "result.json"), read_result(tmp_path / "replay" / "result.json")
     np.testing.assert_array_equal(live.values, again.values)
     np.testing.assert_array_equal(live.covariance, again.covariance)
 

@@ -61,9 +61,9 @@ def nees(found, truth):
 PINNED = ("accel_misalignment_xy", "accel_misalignment_xz", "accel_misalignment_yx")
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site, seed):
-    recording, _ = generate(Scenario(KIM18, imu, site, seed=seed))
+    recording, _ = generate(Scenario(KIM18, imu, site, seed=seed, rate_hz=20.0))
     filtered = calibrate(recording, site, imu, model, held_out=False)
     batch = calibrate(recording, site, imu, model, estimator="batch")
     k = [i for i, name in enumerate(batch.names) if name not in PINNED]
@@ -84,8 +84,8 @@ def test_errors_of_the_batch_are_as_large_as_it_says(imu, model, site):
 
 def test_misfit_of_the_batch_is_that_of_the_noise(imu, model, site):
     total, dof = 0.0, 0.0
-    for seed in range(1, 9):
-        recording, _ = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
+    for seed in range(1, 5):
+        recording, _ = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=20.0))
         fit = calibrate(recording, site, imu, model, estimator="batch").fit
         total, dof = total + fit["nis_mean"] * fit["nis_dof"], dof + fit["nis_dof"]
     # The simulated table stands perfectly still: six of the rows of a stop have less noise than the model says.
@@ -102,14 +102,15 @@ def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
 
 
-@pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0])
-def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, site, azimuth_deg):
-    recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=50.0))
+def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, site):
+    recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=20.0))
     right = calibrate(recording, site, imu, model, estimator="batch")
-    told = replace(site, initial_azimuth_rad=np.radians(azimuth_deg), initial_azimuth_sigma_rad=np.radians(104.0))
-    found = calibrate(recording, told, imu, model, estimator="batch")
     k = [i for i, name in enumerate(right.names) if name not in PINNED]
-    assert np.max(np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]) < 0.02
+    for azimuth_deg in (0.0, 90.0, 180.0):
+        told = replace(site, initial_azimuth_rad=np.radians(azimuth_deg), initial_azimuth_sigma_rad=np.radians(104.0))
+        found = calibrate(recording, told, imu, model, estimator="batch")
+        off = np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]
+        assert np.max(off) < 0.02, azimuth_deg
 
 
 @pytest.mark.parametrize("latitude_deg", [80.0, -80.0, 90.0, -90.0])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,12 @@ def prepared(bench: Any) -> PreparedTest:
     return PreparedTest(bench.recording(), bench.imu, bench.site)
 
 
+@pytest.fixture(scope="module")
+def free(prepared: PreparedTest) -> Callable[[str], Fit]:
+    """Make the fit that states no prior, once for each estimator."""
+    return cache(lambda estimator: solve(prepared, load_model("baseline"), estimator, learn=False))
+
+
 def stated(fit: Fit, name: str, sigmas: float, share: float) -> StatedPrior:
     """A prior at some sigmas from the estimate of a fit, its sigma a share of that of the fit."""
     k = fit.names.index(name)
@@ -33,10 +41,9 @@ def stated(fit: Fit, name: str, sigmas: float, share: float) -> StatedPrior:
     ("name", "estimator"),
     [("accel_bias_y", "filter"), ("gyro_scale_y", "second-order"), ("gyro_misalignment_yz", "second-order")],
 )
-def test_a_stated_prior_conditions_the_fit_of_the_other_coefficients(prepared, name, estimator, share):
+def test_a_stated_prior_conditions_the_fit_of_the_other_coefficients(prepared, free, name, estimator, share):
     """Theory: of a joint normal with covariance C, given ``x_i = m`` with variance s^2."""
-    model = load_model("baseline")
-    free = solve(prepared, model, estimator, learn=False)
+    model, free = load_model("baseline"), free(estimator)
     one = stated(free, name, 2.0, share)
     told = solve(prepared, replace(model, priors=(one,)), learn=False)
     assert told.estimator == estimator

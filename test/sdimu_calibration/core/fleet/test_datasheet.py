@@ -56,7 +56,7 @@ def power_ons(rng: np.random.Generator, number: int, turn_on: float = 0.3) -> tu
 
 @pytest.mark.parametrize("number", [1, 3, 8])
 def test_the_largest_size_is_in_its_interval_as_often_as_stated(number):
-    seeds, hits = 300, np.zeros(2)
+    seeds, hits = 150, np.zeros(2)
     for seed in range(seeds):
         truth, results = power_ons(np.random.default_rng(seed), number, 0.0 if number == 1 else 0.3)
         lines = sheet_of(results)
@@ -68,7 +68,7 @@ def test_the_largest_size_is_in_its_interval_as_often_as_stated(number):
 
 @pytest.mark.parametrize("number", [2, 8])
 def test_repeatability_is_in_its_interval_as_often_as_stated(number):
-    seeds, hits = 300, 0
+    seeds, hits = 150, 0
     for seed in range(seeds):
         line = sheet_of(power_ons(np.random.default_rng(seed), number)[1])["gyro bias repeatability"]
         hits += line.low <= 0.3 * DEG_H <= line.high

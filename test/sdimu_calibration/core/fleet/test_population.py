@@ -26,7 +26,7 @@ def fleet(seed: int, units: int = 8, each: int = 1, spread: float = 3.0, repeat:
 
 
 def test_a_clean_fleet_has_a_unit_out_no_more_often_than_stated():
-    seeds = 150
+    seeds = 80
     false = sum(bool(population(fleet(seed)).out) for seed in range(seeds))
     # 95 % of counts of a rate of FALSE_ALARM are below this.
     assert false <= FALSE_ALARM * seeds + 2.0 * np.sqrt(FALSE_ALARM * seeds)

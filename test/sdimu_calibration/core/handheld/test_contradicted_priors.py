@@ -32,11 +32,10 @@ def told(fit):
     return [note for note in fit.test.recording.notes if "contradict priors" in note]
 
 
-@pytest.mark.parametrize("name", ["dtg", "fog_tactical", "mems_industrial"])
-def test_a_file_of_another_class_costs_a_note(site, name):
+def test_a_file_of_another_class_costs_a_note(site):
     """Unmended, its priors hold every coefficient at zero, and the errors are learned as scatter of 10 mg and more."""
     z = []
-    for seed in (5, 6, 7):
+    for seed, name in ((5, "dtg"), (6, "fog_tactical"), (7, "mems_industrial")):
         fit, own = fitted(site, seed, load_imu(name))
         assert "gyro_misalignment" in told(fit)[0]
         assert name in told(fit)[0]
@@ -44,7 +43,7 @@ def test_a_file_of_another_class_costs_a_note(site, name):
     assert np.sqrt(np.mean(np.square(np.concatenate(z)))) < 1.4
 
 
-@pytest.mark.parametrize("seed", range(20, 26))
+@pytest.mark.parametrize("seed", range(20, 23))
 def test_the_right_file_stands(site, seed):
     fit, z = fitted(site, seed, TRUE)
     assert not told(fit)

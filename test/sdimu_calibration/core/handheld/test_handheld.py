@@ -49,7 +49,7 @@ def errors(seed, site, **options):
 
 def test_errors_of_percents_are_found_with_honest_sigmas(site):
     total, dof = 0.0, 0
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         error, P, _ = errors(seed, site)
         s = np.sqrt(np.diag(P))
         total += float((error / s) @ np.linalg.solve(P / np.outer(s, s), error / s))
@@ -145,7 +145,7 @@ def without_turns(recording, which, gap_s=60.0):
 @pytest.mark.parametrize("every", [1, 3])
 def test_turns_that_nobody_saw_say_nothing_and_spoil_nothing(site, every):
     total, dof = 0.0, 0
-    for seed in (11, 12, 13):
+    for seed in (11, 12):
         recording, truth = by_hand_recording(ByHand(24, MEMS, site, seed=seed))
         found = calibrate(without_turns(recording, lambda i: i % every == 0), None, MEMS, MODEL, estimator="handheld")
         true = in_body_frame(

@@ -135,7 +135,7 @@ def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tm
     assert "nothing stands out" in after["verdict"]["children"]
     rungs = after["ladder"]["figure"]["data"][0]["x"]
     assert rungs[1] < rungs[0]
-    # A right model predicts left-out stops to one sigma; 11,000 numbers scatter by 0.7 %.
+    # A right model predicts left-out stops to one sigma; 7,000 numbers scatter by 0.9 %.
     assert rungs[1] == pytest.approx(1.0, abs=0.03)
 
     packed = page.post("file.data", "export.n_clicks")["file"]["data"]["content"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -36,13 +37,19 @@ _SPAN_S = 20_000.0
 
 def reads(effect: Effect) -> frozenset[str]:
     """Names of the fields of `Motion` on which the regressors of an effect depend."""
-    rng = np.random.default_rng(3)
-    one, other = any_motion(rng), any_motion(rng)
-    other = replace(other, t=0.6 * one.t + 7.0, rest=~one.rest, past=_AnyMemory(-one.past["", 0.0]))
+    one, other = _two_motions()
     before = effect.regressors(one)
     return frozenset(
         name for name in FIELDS if not np.array_equal(effect.regressors(_changed(one, other, name)), before)
     )
+
+
+@cache
+def _two_motions() -> tuple[Motion, Motion]:
+    """Two motions that differ in every variable, the same for all effects."""
+    rng = np.random.default_rng(3)
+    one, other = any_motion(rng), any_motion(rng)
+    return one, replace(other, t=0.6 * one.t + 7.0, rest=~one.rest, past=_AnyMemory(-one.past["", 0.0]))
 
 
 def _changed(one: Motion, other: Motion, name: str) -> Motion:
