@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -40,12 +40,14 @@ LONG: dict[Place, str] = {
 """Functions with more lines, and why."""
 
 
-def functions() -> Iterator[tuple[str, Function]]:
-    for path in sorted(SRC.rglob("*.py")):
-        name = "/".join(path.relative_to(SRC).parts[1:])
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, Function):
-                yield name, node
+@cache
+def functions() -> list[tuple[str, Function]]:
+    return [
+        ("/".join(path.relative_to(SRC).parts[1:]), node)
+        for path in sorted(SRC.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, Function)
+    ]
 
 
 def count_arguments(function: Function) -> int:

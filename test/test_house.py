@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -98,14 +99,20 @@ _OTHER_WORDS = {"temperature_rate", "random_walk"}
 """A field of `Motion`, and a term of the Allan deviation."""
 
 
+@cache
+def effect_names() -> frozenset[str]:
+    effects = [registry.get(name) for name in registry.names()]
+    return frozenset({e.name for e in effects} | {p.name for e in effects for p in e.parameters})
+
+
 def effect_names_in(tree: ast.AST) -> list[tuple[int, str]]:
     """Line and text of every literal that is the name of an effect or coefficient, a part of one, or makes one.
 
     Sentences may name effects; a word alone, or a pattern such as ``f"{triad}_misalignment_{pair}"``, is a list of
     effects kept where a new one does not find it.
     """
-    effects = [registry.get(name) for name in registry.names()]
-    names = {e.name for e in effects} | {p.name for e in effects for p in e.parameters}
+    names = effect_names()
+    lines = "\n".join(names)
     prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     inner = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
     found = []
@@ -122,7 +129,7 @@ def effect_names_in(tree: ast.AST) -> list[tuple[int, str]]:
         if fixed in _OTHER_WORDS or not re.fullmatch(r"[a-z0-9_]{5,}", fixed):
             continue
         pattern = "".join(r"\w+" if part is None else re.escape(part) for part in parts)
-        if any(re.search(rf"(^|_){pattern.strip('_')}(_|$)", name) for name in names):
+        if re.search(rf"(^|_){pattern.strip('_')}(_|$)", lines, re.MULTILINE):
             found.append((node.lineno, ast.unparse(node)))
     return found
 

@@ -45,8 +45,7 @@ def test_an_imu_that_never_rests_has_no_dwells():
     assert detected_dwells(replace(r, omega_ib_b=np.sin(phase), phase=None)) is None
 
 
-@pytest.mark.parametrize("seed", [81, 82])
-@pytest.mark.parametrize("block_s", [1.0, 7.3])
+@pytest.mark.parametrize(("seed", "block_s"), [(81, 1.0), (82, 7.3)])
 def test_a_test_that_goes_on_knows_its_dwells_a_few_seconds_later(seed, block_s):
     r, _ = generate(Scenario(HURRIED, MEMS, load_site("daejeon"), rate_hz=20.0, seed=seed))
     growing, decided, found, at = GrowingDwells(0.05), 0.0, [], 0

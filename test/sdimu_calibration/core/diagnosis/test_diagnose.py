@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.advice_words import sentence
 
-SEEDS = (101, 102, 103)
+SEEDS = (101, 102)
 _EFFECTIVE = 150
 """Independent directions among the candidates; the design study gives 144 to 159, it is not computed here."""
 _HIDDEN = ("accel_scale_asymmetry_z=60 ppm",)
@@ -38,7 +38,7 @@ def test_clean_data_give_scores_of_unit_size_and_no_find(bench):
         finds += len(diagnosis.chosen) > 0
     # Four standard errors of a mean square of as many independent normals.
     assert abs(np.mean(squares) - 1.0) < 4.0 * np.sqrt(2.0 / (_EFFECTIVE * len(SEEDS)))
-    # A find in one scan has probability 0.02: two of three have 1e-3.
+    # A find in one scan has probability 0.02: two of two have 4e-4.
     assert finds <= 1
 
 

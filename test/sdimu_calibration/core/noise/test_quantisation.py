@@ -140,7 +140,7 @@ def test_a_file_that_states_the_pulses_of_the_gyros_alone_is_as_good(site):
     assert 0.5 < np.sqrt(np.mean(np.square(baseline_z(found, sensor)))) < 1.0 + 3.0 / np.sqrt(2.0 * 27.0)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_ring_laser_gyro_that_counts_is_calibrated(site, seed):
     """Means over a second scatter eight times more than the file says: every dwell would count as motion."""
     test, sensor = counted(site, seed)
