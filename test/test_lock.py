@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from importlib.metadata import requires
 from pathlib import Path
 
@@ -54,6 +56,20 @@ def test_what_setup_asks_for_is_in_its_file_or_in_what_is_installed_before(name)
             extra = one.marker is not None and any(one.marker.evaluate({"extra": extra}) for extra in EXTRAS[name])
             if (one.marker is None) if always else extra:
                 assert canonicalize_name(one.name) in {*there, *OWN}, one
+
+
+def test_loops_are_compiled_before_ros_is_there():
+    """requirements/install.py fetches the packages of ROS last, while requirements/kernels.py compiles."""
+    script = ROOT / "requirements" / "kernels.py"
+    code = f"import runpy, sys; runpy.run_path({str(script)!r}); print('rclpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "False", done.stderr
+    first = {
+        entry.partition("==")[0] for entry in entries("run") if not entry.startswith("ros-") and " ; " not in entry
+    }
+    assert {"numba", "numpy", "scipy", "pydantic", "pyyaml"} <= first
+    for name in sorted(first):
+        assert not [text for text in requires(name) or [] if text.startswith("ros-")], name
 
 
 TOOLS = {
