@@ -3,8 +3,8 @@
 ``python requirements/install.py run test`` installs run.lock and test.lock, every file by its hash.
 
 On a new machine three things take their time: what is fetched and unpacked, modules that become bytecode, and loops
-that become machine code. The first waits for network and disk, the others for a processor, so they go on at once: first
-comes what the loops need, then the rest, while `kernels.py` compiles.
+that become machine code. The first waits for network and disk, the others for a processor, so they go on at once: the
+packages of ROS are fetched beside the others, and as soon as these are there, `kernels.py` compiles.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
-from typing import IO
 
 FOLDER = Path(__file__).resolve().parent
 PURELIB = Path(sysconfig.get_path("purelib"))
@@ -39,48 +38,53 @@ def present() -> int:
     return len(list(PURELIB.glob("*.dist-info")))
 
 
-class Followed(Thread):
-    """What pip says, kept for the case that it fails, and how many packages it has fetched."""
+class Pip(Thread):
+    """Installs entries of lock files, without bytecode; keeps what pip says for the case that it fails."""
 
-    def __init__(self, stream: IO[str]) -> None:
+    def __init__(self, wanted: Sequence[str]) -> None:
         super().__init__(daemon=True)
-        self._stream = stream
-        self.lines: list[str] = []
+        self._wanted = wanted
+        self.said: list[str] = []
         self.fetched = 0
-        self.unpacking = False
+        self.status = 0
 
     def run(self) -> None:
-        """Read to the end."""
-        for line in self._stream:
-            self.lines.append(line)
-            self.fetched += line.startswith(("Collecting ", "Requirement already satisfied"))
-            self.unpacking |= line.startswith("Installing collected packages")
+        """Install, and count what is fetched."""
+        if not self._wanted:
+            return
+        with tempfile.TemporaryDirectory() as folder:
+            names = Path(folder) / "wanted.txt"
+            names.write_text("\n".join(self._wanted), encoding="utf-8")
+            command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--no-deps"]
+            command += ["--no-compile", "--require-hashes", "--no-color", "--progress-bar", "off", "-r", str(names)]
+            pip = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            assert pip.stdout is not None
+            for line in pip.stdout:
+                self.said.append(line)
+                self.fetched += line.startswith(("Collecting ", "Requirement already satisfied"))
+            self.status = pip.wait()
 
 
-def install(wanted: Sequence[str]) -> int:
-    """Install entries of lock files without bytecode; return the exit status of pip."""
+def install(first: Sequence[str], then: Sequence[str]) -> int:
+    """Install two lists of packages side by side, compile loops as soon as the first is there; return a status."""
     before, begun = present(), time.monotonic()
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
-        names = Path(folder) / "wanted.txt"
-        names.write_text("\n".join(wanted), encoding="utf-8")
-        command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--no-deps", "--no-compile"]
-        command += ["--require-hashes", "--no-color", "--progress-bar", "off", "-r", str(names)]
-        pip = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
-        assert pip.stdout is not None
-        followed = Followed(pip.stdout)
-        followed.start()
-        while True:
-            try:
-                status = pip.wait(EVERY_S)
-                break
-            except subprocess.TimeoutExpired:
-                done = f"{present() - before} unpacked" if followed.unpacking else f"{followed.fetched} fetched"
-                print(f"  {done} of {len(wanted)}, {time.monotonic() - begun:.0f} s", flush=True)  # noqa: T201
-        followed.join()
-        if status:
-            errors.seek(0)
-            sys.stderr.write("".join(followed.lines) + errors.read())
-    return status
+    pips = [Pip(first), Pip(then)]
+    for pip in pips:
+        pip.start()
+    compiling = not then
+    while any(pip.is_alive() for pip in pips):
+        until = time.monotonic() + EVERY_S
+        while any(pip.is_alive() for pip in pips) and time.monotonic() < until:
+            time.sleep(0.1)
+            if not compiling and not pips[0].is_alive():
+                compiling = True
+                start_kernels()
+        done = f"{sum(pip.fetched for pip in pips)} fetched, {present() - before} unpacked"
+        print(f"  {done} of {len(first) + len(then)}, {time.monotonic() - begun:.0f} s", flush=True)  # noqa: T201
+    for pip in pips:
+        if pip.status:
+            sys.stderr.write("".join(pip.said))
+    return max(pip.status for pip in pips)
 
 
 def to_bytecode() -> None:
@@ -100,10 +104,7 @@ def main(names: Sequence[str]) -> int:
     wanted = [entry for name in names for entry in entries(name)]
     print(f"installing {len(wanted)} packages ({', '.join(names)}) into {sys.prefix}", flush=True)  # noqa: T201
     ros = [entry for entry in wanted if entry.startswith(ROS)]
-    status = install([entry for entry in wanted if entry not in ros])
-    if ros and not status:
-        start_kernels()
-        status = install(ros)
+    status = install([entry for entry in wanted if entry not in ros], ros)
     if not status:
         to_bytecode()
     return status

@@ -59,7 +59,7 @@ def test_what_setup_asks_for_is_in_its_file_or_in_what_is_installed_before(name)
 
 
 def test_loops_are_compiled_before_ros_is_there():
-    """requirements/install.py fetches the packages of ROS last, while requirements/kernels.py compiles."""
+    """requirements/install.py fetches the packages of ROS beside the others, and compiles when these are there."""
     script = ROOT / "requirements" / "kernels.py"
     code = f"import runpy, sys; runpy.run_path({str(script)!r}); print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
