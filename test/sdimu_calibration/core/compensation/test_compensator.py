@@ -69,9 +69,7 @@ def test_the_simulated_imu_is_undone_to_the_second_order_of_its_axes(make_result
     assert np.abs(done.omega_ib_b - omega).max() < 4.0 * angle**2 * np.abs(omega).max()
 
 
-@pytest.mark.parametrize(
-    "effect", [n for n, read in READS.items() if read <= {"w", "f"} and n not in BASELINE]
-)
+@pytest.mark.parametrize("effect", [n for n, read in READS.items() if read <= {"w", "f"} and n not in BASELINE])
 def test_an_effect_of_rate_and_force_is_undone_with_the_baseline(make_result, effect):
     result = make_result((*BASELINE, effect), size=0.2)
     # A dead band of MEMS size swallows rates that are then unknown: test it where it can be inverted.
