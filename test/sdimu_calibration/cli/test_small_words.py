@@ -104,3 +104,12 @@ def test_the_readme_states_the_least_python_of_the_packages():
     (least,) = re.findall(r"Python (3\.\d+) to", (root / "README.md").read_text())
     for setup in [*root.glob("src/*/setup.py"), root / "study" / "setup.py"]:
         assert f'python_requires=">={least}"' in setup.read_text(), setup
+
+
+def test_a_verb_that_is_none_names_those_that_look_like_it(monkeypatch, capsys):
+    for typed, words in (("calibrat", "did you mean calibrate"), ("xyzzy", "sdimu --help lists them")):
+        monkeypatch.setattr("sys.argv", ["sdimu", typed])
+        with pytest.raises(SystemExit) as ending:
+            cli.main()
+        assert ending.value.code == 2
+        assert words in " ".join(capsys.readouterr().err.replace("│", " ").split())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -86,7 +87,9 @@ class Fitted:
     def __getitem__(self, name: str) -> Coefficient:
         """Give a coefficient by its name."""
         if name not in self.names:
-            raise KeyError(f"no coefficient '{name}' in this model (it has {', '.join(self.names[:6])}, ...)")
+            near = get_close_matches(name, self.names, n=3)
+            hint = f"did you mean {', '.join(near)}?" if near else f"it has {', '.join(self.names[:6])}, ..."
+            raise KeyError(f"no coefficient '{name}' in this model; {hint}")
         k, result = self.names.index(name), self.result
         sigma = float(np.sqrt(self.covariance[k, k]))
         return Coefficient(name, float(self.values[k]), sigma, result.units[k], result.display_units[k])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 from sdimu_calibration.api.comparison import Comparison
 from sdimu_calibration.api.diagnosis import FitDiagnosis
@@ -28,18 +28,22 @@ from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import parse_quantity
+from sdimu_calibration.storage.arrays import raw_test
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.opening import Opening, Source
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _ABLE = Abilities((math.radians(2.0), math.radians(10.0)), math.radians(20.0), (20.0, 40.0, 60.0, 80.0, 100.0, 130.0))
 """What the table may be asked for: mean rates (rad/s), acceleration (rad/s^2) and dwells (s), as of `sdimu plan`."""
 
 
 def open(  # noqa: A001 (as every library of files has it)
-    bag: str | Path,
+    bag: str | Path | Mapping[str, Any] | pd.DataFrame,
     site: str | None = None,
     imu: str | ImuSpecification | None = None,
     source: Source | None = None,
@@ -54,8 +58,11 @@ def open(  # noqa: A001 (as every library of files has it)
 
     Parameters
     ----------
-    bag : str or Path
-        rosbag2 folder, .mcap or .db3 file, ROS 1 .bag.
+    bag : str, Path, mapping of str to array, or DataFrame
+        rosbag2 folder, .mcap or .db3 file, ROS 1 .bag; or the samples: ``t`` (s) or ``ns`` (integers), shape (n,), end
+        of the interval of each; ``gyro`` (rad/s) and ``accel`` (m/s^2), shape (n, 3), or their columns ``gyro_x`` ...
+        ``accel_z``, means over the interval; optional ``temperature`` (deg C), ``dwell`` (true at rest) and ``stop``
+        (integers), shape (n,). Other units: `source`.
     site : str, optional
         Name in config/site or path; left out it is assumed, and a note says so; refused where the latitude in the
         data excludes it. A handheld run needs none.
@@ -77,7 +84,7 @@ def open(  # noqa: A001 (as every library of files has it)
     rests : sequence of (float, float)
         By hand: begin and end (s after the first sample) of every rest; without any they are found.
     """
-    return Opening(
+    opening = Opening(
         site=site,
         imu=load_imu(imu) if isinstance(imu, str) else imu,
         source=source or Source(),
@@ -88,7 +95,11 @@ def open(  # noqa: A001 (as every library of files has it)
         exclude_times=tuple(exclude_times),
         rests=tuple(rests),
         imu_file=imu if isinstance(imu, str) else None,
-    ).test(Path(bag))
+    )
+    if isinstance(bag, str | Path):
+        return opening.test(Path(bag))
+    # A data frame is no mapping, but has its columns by name as one has.
+    return opening.test_of(raw_test(cast("Mapping[str, Any]", bag)))
 
 
 def open_set(

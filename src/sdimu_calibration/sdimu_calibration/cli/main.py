@@ -11,6 +11,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import FrameType
@@ -47,6 +48,8 @@ _VERBS = {
     for name in _PLACED
     if name not in _ELSEWHERE.split()
 }
+_LIKE = 0.6
+"""Share of letters (1) from which a verb looks like what was typed: one letter more, less or other."""
 _MORE = "More"
 """Where verbs of other packages stand that have no place above."""
 
@@ -64,6 +67,14 @@ class Verbs(TyperGroup):
         options = super().get_params(ctx)
         _take_no_type(options)
         return options
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the verb; of one that is none, name those that look like it."""
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            near = get_close_matches(args[0], self.list_commands(ctx), n=3, cutoff=_LIKE)
+            hint = f"did you mean {', '.join(near)}?" if near else "sdimu --help lists them"
+            ctx.fail(f"no verb '{args[0]}'; {hint}")
+        return super().resolve_command(ctx, args)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""

@@ -15,6 +15,8 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.report_extras import ReportExtras
 
 _KILOMETRE = 1000.0
+_WHOLE = 100.0
+"""Amount from which there are no decimals: three digits of it would be written with an exponent."""
 _WHOLE_M = 10.0
 """Distance (m) from which metres have no decimals: a tenth of less is still seen."""
 
@@ -41,7 +43,13 @@ class Off:
     @property
     def text(self) -> str:
         """In words: ``gyro_scale_y +26.2 ppm (5.5 of its sigmas)``."""
-        return f"{self.name} {self.amount:+.3g} {self.unit} ({abs(self.sigmas):.1f} of its sigmas)"
+        return f"{self.name} {self.size} ({abs(self.sigmas):.1f} of its sigmas)"
+
+    @property
+    def size(self) -> str:
+        """The amount with its unit: ``+26.2 ppm``."""
+        whole = abs(self.amount) >= _WHOLE
+        return f"{self.amount:+.0f} {self.unit}" if whole else f"{self.amount:+.3g} {self.unit}"
 
 
 def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]:

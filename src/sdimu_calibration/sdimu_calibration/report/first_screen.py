@@ -153,7 +153,7 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
 
 def _off(one: Off) -> tuple[str, str]:
     """Say by how much a coefficient is wrong."""
-    amount = f"{one.amount:+.3g} {one.unit}".replace("-", "\N{MINUS SIGN}")
+    amount = one.size.replace("-", "\N{MINUS SIGN}")
     return amount, f"<code>{escape(one.name)}</code> is off without it: {abs(one.sigmas):.1f} of its sigmas"
 
 

@@ -160,7 +160,7 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
 def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw) -> list[str]:
     """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
     diagnosis = summary.diagnosis
-    found = {one.candidate.label: size_of(one) for one in summary.found}
+    found = {one.candidate.label: size_of(one).replace("+-", "\N{PLUS-MINUS SIGN}") for one in summary.found}
     if diagnosis.fit.learns_scatter:
         odds = odds_section(diagnosis.probabilities, "in this run", found=found)
         return [odds, *handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]

@@ -225,9 +225,12 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         if not one.alike and not one.together:
             continue
         shares = {share.name: f" {in_percent(share.probability)}" for share in one.may_be}
+        # Time constants of one coefficient share its probability: it stands once.
+        alike = {name.partition("(")[0]: name for name in reversed(one.alike)}
         others = "; ".join(
-            tip(title_of(name), effect_of_key(name), [name]) + shares.get(name.partition("(")[0], "")
-            for name in one.alike[:6]
+            tip(title_of(name), effect_of_key(name), [name]) + shares.get(coefficient, "")
+            for coefficient, name in list(reversed(alike.items()))[:6]
+            if coefficient != one.candidate.coefficient
         )
         pairs = "; ".join(
             f"<code>{escape(first)}</code> with <code>{escape(second)}</code> together {in_percent(p)}"

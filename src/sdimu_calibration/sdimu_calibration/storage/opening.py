@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from sdimu_calibration.core.data.arrival import RawTest, in_order
 from sdimu_calibration.core.data.axes_and_units import Stated
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, in_si
@@ -173,7 +174,19 @@ class Opening:
 
     def test(self, path: Path) -> PreparedTest:
         """Open a bag so."""
-        test = open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise)
+        return self._of(open_test(path, self.site, self.imu, self.source, self.handheld, self.measured_noise))
+
+    def test_of(self, raw: RawTest) -> PreparedTest:
+        """Open samples so that a program holds."""
+        options = opening_options(self.site, self.imu, self.source, self.handheld, self.measured_noise)
+        opened = open_recorded(in_order(raw), options, raw.where)
+        site = (self.site or DEFAULT_SITE) if opened.site else ""
+        origin = Origin(recording=raw.where, site=one_line(Path(site).stem), site_file=stated_path(site))
+        assumed = options.assumed_site if opened.site else ""
+        return self._of(PreparedTest(*opened, assumed_site=assumed, origin=origin))
+
+    def _of(self, test: PreparedTest) -> PreparedTest:
+        """Let a test have what is stated of it."""
         test = with_imu_file(test, self.imu_file)
         origin = test.origin.stated(self.serial, self.power_on)
         test = replace(test, whole_turns=self.whole_turns, rests=self.rests, origin=origin)

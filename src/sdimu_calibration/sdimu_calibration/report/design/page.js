@@ -4,7 +4,8 @@
   window.sdimuTheme = function () { return root.dataset.theme || (dark.matches ? 'dark' : 'light'); };
   function tell() {
     document.querySelectorAll('[data-switch-theme]').forEach(function (b) {
-      b.setAttribute('aria-pressed', String(window.sdimuTheme() === 'dark'));
+      // The button says what a click on it does.
+      b.textContent = window.sdimuTheme() === 'dark' ? 'Light page' : 'Dark page';
     });
     window.dispatchEvent(new Event('sdimu-theme'));
   }

@@ -31,7 +31,7 @@ SCRIPT = (_HERE / "page.js").read_text(encoding="utf-8")
 """Behaviour of every page. `sdimuTheme()` is the theme; the event ``sdimu-theme`` says that it changed."""
 EARLY = "try{var t=localStorage.getItem('sdimu-theme');if(t)document.documentElement.dataset.theme=t}catch(e){}"
 """Stands in the head, so that a dark page does not flash."""
-THEME_BUTTON = '<button type="button" data-switch-theme aria-pressed="false">Dark</button>'
+THEME_BUTTON = '<button type="button" data-switch-theme>Dark page</button>'
 
 
 def document(

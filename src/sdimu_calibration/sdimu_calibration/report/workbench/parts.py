@@ -42,7 +42,8 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.mended or (missing.adequate and objections):
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    return f"{mark} {missing.sentence}", f"verdict {tone}"
+    said = missing.sentence.replace(" +- ", " \N{PLUS-MINUS SIGN} ").replace("(-", "(\N{MINUS SIGN}")
+    return f"{mark} {said}", f"verdict {tone}"
 
 
 def odds(missing: Missing) -> list[Any]:

@@ -105,7 +105,7 @@ def _bar(title: str) -> Any:
                     html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
                     html.Button("Undo", id="undo", title="Ctrl+Z"),
                     html.Button("Redo", id="redo", title="Ctrl+Y"),
-                    html.Button("Dark", id="theme", **{"data-switch-theme": "", "aria-pressed": "false"}),
+                    html.Button("Dark page", id="theme", **{"data-switch-theme": ""}),
                     html.Button("Keys ?", id="help-open", **{"aria-controls": "help"}),
                 ],
                 className="line",
