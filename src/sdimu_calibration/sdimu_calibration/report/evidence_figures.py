@@ -30,7 +30,7 @@ def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure
     return deviates([str(s) for s in grid.stops], channels, grid.value, "stop", "channel", 440)
 
 
-def heat_maps(grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, height: int = 340) -> Figure:
+def heat_maps(grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, height: int = 330) -> Figure:
     """Draw heat maps of several models with one scale of colours upon each other; a switch of the page shows one."""
     figure = heat_map(grids[0], channels)
     for grid in grids[1:]:
