@@ -20,7 +20,7 @@ _MOST_HZ = 1e6
 def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="result.json of a calibration, or its folder.")],
     form: Annotated[
-        str, typer.Option("--format", help="matrices, kalibr, imu_tk, c-header, yaml or csv.")
+        str, typer.Option("--format", help="matrices, kalibr, imu_tk, px4, ardupilot, c-header, yaml or csv.")
     ] = "matrices",
     out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     imu: Annotated[
@@ -33,7 +33,7 @@ def export(
     ] = None,
     effect: OwnEffectOption = None,
 ) -> None:
-    """Write a result as matrices, Kalibr YAML, imu_tk files, a C header, YAML or CSV.
+    """Write a result as matrices, Kalibr YAML, imu_tk files, parameters of PX4 or ArduPilot, a C header, YAML or CSV.
 
     A result that is not to be trusted is written all the same; stderr says why it is not.
     """

@@ -131,7 +131,32 @@ def by_c(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return out[:, :3], out[:, 3:]
 
 
+def along_the_axes(read: dict[str, float], names: tuple[str, str, str]) -> Apply:
+    """Correct as both autopilots do: offset, then scale of the force; offset of the rate."""
+    offset, scale, drift = (np.array([read[name.format(axis)] for axis in "XYZ"]) for name in names)
+    return lambda _, w, f: (w - drift, (f - offset) * scale)
+
+
+def by_px4(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Read as QGroundControl does: five columns behind tabs, lines that begin with # are words."""
+    rows = [line.split("\t") for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert all(len(row) == 5 and row[:2] == ["1", "1"] and row[4] == "9" for row in rows)
+    read = {row[2]: float(row[3]) for row in rows}
+    assert max(map(len, read)) <= 16  # of MAVLink
+    return along_the_axes(read, ("CAL_ACC0_{}OFF", "CAL_ACC0_{}SCALE", "CAL_GYRO0_{}OFF"))(path, w, f)
+
+
+def by_ardupilot(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Read as Mission Planner does: name, comma, value; lines that begin with # are words."""
+    rows = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+    read = {name: float(value) for name, value in rows}
+    assert max(map(len, read)) <= 16
+    return along_the_axes(read, ("INS_ACCOFFS_{}", "INS_ACCSCAL_{}", "INS_GYROFFS_{}"))(path, w, f)
+
+
 READERS: dict[str, Apply] = {
+    "px4": by_px4,
+    "ardupilot": by_ardupilot,
     "matrices": by_matrices,
     "yaml": by_yaml,
     "csv": by_csv,
@@ -146,6 +171,9 @@ def test_a_form_applied_to_raw_samples_gives_the_numbers_of_the_core(form: str, 
     made = result(*BASELINE)
     if form == "imu_tk":  # no place for sensitivity to force: the rest must agree
         made.values[np.array(["unbalance" in name for name in made.names])] = 0.0
+    if form in {"px4", "ardupilot"}:  # places for these alone
+        kept = ("gyro_bias", "accel_bias", "accel_scale")
+        made.values[np.array([not name.startswith(kept) for name in made.names])] = 0.0
     path = tmp_path / FORMS[form].file_name
     export(form, path, made, IMU)
     w, f = raw()
@@ -251,6 +279,15 @@ def test_what_a_form_cannot_hold_is_said_in_the_file_and_to_the_user(form: str, 
         text = file.read_text()
         assert text.count("NOT IN THIS FILE: accel_quadratic_") == 3
     assert sum("accel_quadratic" in line for line in done.missing) == 3
+
+
+@pytest.mark.parametrize("form", ["px4", "ardupilot"])
+def test_an_autopilot_is_told_what_its_parameters_cannot_hold(form: str, tmp_path: Path) -> None:
+    done = export(form, tmp_path / "x.params", result(*BASELINE), IMU)
+    for words in ("scale factors of the gyros", "misalignment of the gyros", "misalignment of the accel", "mass unbal"):
+        assert sum(words in line for line in done.missing) == 1, words
+        assert words in (tmp_path / "x.params").read_text()
+    assert "force = (measured - offset) * scale" in (tmp_path / "x.params").read_text()
 
 
 def test_imu_tk_says_that_it_has_no_place_for_mass_unbalance(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.storage.export import c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
+from sdimu_calibration.storage.export import autopilot, c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
 from sdimu_calibration.storage.export.shared import Source
 from sdimu_calibration.storage.files.whole_file import write_whole
 
@@ -30,6 +30,8 @@ FORMS = {
     "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
     "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),
     "yaml": Form("compensation.yaml", yaml_file.texts, yaml_file.cannot_hold),
+    "px4": Form("px4.params", autopilot.px4_texts, autopilot.cannot_hold),
+    "ardupilot": Form("ardupilot.param", autopilot.ardupilot_texts, autopilot.cannot_hold),
     "csv": Form("coefficients.csv", csv_table.texts, csv_table.cannot_hold),
 }
 
