@@ -43,8 +43,6 @@ def pair(console: Console, name: str, text: str, width: int) -> None:
 
     Parameters
     ----------
-    console : Console
-    name, text : str
     width : int
         Characters of the longest name.
     """

@@ -111,11 +111,8 @@ class Findings:
 
     Attributes
     ----------
-    about : Asked
     title : str
         Of the page.
-    summary : DiagnosisSummary
-    more : ReportExtras
     null : Null or None
         Of a bootstrap.
     """

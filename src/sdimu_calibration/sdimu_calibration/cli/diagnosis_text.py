@@ -142,7 +142,6 @@ def candidate_rows(f: Found, told: Probabilities | None) -> list[list[str]]:
 
     Parameters
     ----------
-    f : Found
     told : Probabilities or None
         Where the sizes stand of what it may be instead.
     """

@@ -90,10 +90,8 @@ class RunningTest:
         0 where nobody knows.
     stops : int
         0 where nobody knows.
-    model, imu : str
     start_ns : int
         Stamp of its begin.
-    domain : int
     """
 
     folder: str

@@ -27,10 +27,8 @@ class Off:
 
     Attributes
     ----------
-    name : str
     amount : float
         By how much it is too large, in `unit`.
-    unit : str
     sigmas : float
         The same over the sigma that it is given with.
     """
@@ -80,7 +78,6 @@ class InUse:
     ----------
     minutes : float
         Length of a navigation.
-    stretches : int
     names : tuple of str
         Of the compensations, the worst model first.
     distance : tuple of float

@@ -103,7 +103,6 @@ def ranking(
 
     Parameters
     ----------
-    entries : sequence of Scored
     threshold : float
         Score that noise reaches.
     classes : mapping of str to mapping, optional
@@ -154,10 +153,7 @@ def ranking(
             marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
             hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
         )
-    for word, ink in _FAMILY_INK.items():
-        if any(_family_ink(s.label) == ink for s in shown):
-            mark = {"symbol": "square", "color": ink, "size": 10}
-            figure.add("scatter", x=[None], y=[None], mode="markers", name=word, marker=mark, hoverinfo="skip")
+    _legend_of_families(figure, shown)
     figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
     figure.annotate(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
@@ -174,6 +170,14 @@ _FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
 """Ink of a bar by what its effect acts on."""
 _ASIDE = 0.45
 """Opacity of the bar of an effect that was not found (1): those that were stand out."""
+
+
+def _legend_of_families(figure: Figure, shown: Sequence[data.Scored]) -> None:
+    """Say which ink a bar has by what its effect acts on."""
+    for word, ink in _FAMILY_INK.items():
+        if any(_family_ink(s.label) == ink for s in shown):
+            mark = {"symbol": "square", "color": ink, "size": 10}
+            figure.add("scatter", x=[None], y=[None], mode="markers", name=word, marker=mark, hoverinfo="skip")
 
 
 def _family_ink(label: str) -> str:

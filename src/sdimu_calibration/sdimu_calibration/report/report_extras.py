@@ -39,7 +39,6 @@ def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportE
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     delivered : Fit, optional
         That was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in its place.
     """
