@@ -185,3 +185,16 @@ def test_copies_read_back_as_the_table(diagnosis):
         assert copied[row.name]["value"] == pytest.approx(row.value, rel=1e-8, abs=1e-12)
         assert copied[row.name]["unit"] == listed[row.name]["unit"] == row.unit
         assert float(listed[row.name]["sigma"]) == pytest.approx(row.sigma, rel=1e-3)
+
+
+def test_what_looks_the_same_shares_the_bar_of_what_was_found(diagnosis):
+    entries = data.scored(diagnosis)
+    (found,) = (one for one in entries if one.chosen)
+    other = next(one.label for one in entries if not one.chosen and one.z and "(" not in one.label)
+    alone = evidence_figures.ranking(entries, 4.0).data[0]
+    assert other in alone["y"]
+    shares = {found.label: {found.label.partition("(")[0]: "82 %", other: "18 %"}}
+    folded = evidence_figures.ranking(entries, 4.0, shares).data[0]
+    assert other not in folded["y"]
+    (words,) = (text for text in folded["customdata"] if "82 %" in text)
+    assert words.endswith(f", 82 %; or {other} 18 %")

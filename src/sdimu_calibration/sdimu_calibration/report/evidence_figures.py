@@ -113,8 +113,8 @@ def ranking(
     folded = {name for label, shares in told.items() for name in shares if name != label.partition("(")[0]}
     left = [s for s in data.best_variants(entries) if s.chosen or s.label.partition("(")[0] not in folded]
     shown = left[:_MOST_BARS]
-    names = [_bar_name(s, told.get(s.label, {})) for s in shown]
-    sizes = [with_sigma(s.estimate, s.sigma, s.unit) for s in shown]
+    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
+    sizes = [with_sigma(s.estimate, s.sigma, s.unit) + _shares_in_words(s, told.get(s.label, {})) for s in shown]
     figure = Figure()
     figure.add(
         "bar",
@@ -162,8 +162,7 @@ def ranking(
     figure.x_axes(title="score |z| (sigma)", range=[0, 1.3 * top])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
-    lines = sum(name.count("<br>") for name in names)
-    return lay_out(figure, 24 * len(shown) + 14 * lines + 150, showlegend=True, margin=margin, legend=_LEGEND)
+    return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
 _FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
@@ -185,14 +184,11 @@ def _family_ink(label: str) -> str:
     return _FAMILY_INK[{"gyro": "gyro", "accel": "accelerometer"}.get(triad, "other")]
 
 
-def _bar_name(entry: data.Scored, shares: Mapping[str, str]) -> str:
-    """Label of a bar: a triangle at what was found, and what it may be instead below it."""
-    if not entry.chosen:
-        return entry.label
+def _shares_in_words(entry: data.Scored, shares: Mapping[str, str]) -> str:
+    """Say how probable a bar is, and what it may be instead; empty where it is told which effect it is."""
     own = entry.label.partition("(")[0]
-    lines = [f"\N{BLACK RIGHT-POINTING TRIANGLE} {entry.label} {shares.get(own, '')}".rstrip()]
-    lines += [f"or {name} {p}" for name, p in shares.items() if name != own]
-    return "<br>".join(lines)
+    others = [f"or {name} {p}" for name, p in shares.items() if name != own]
+    return "; ".join([f", {shares.get(own, '')}", *others]) if others else ""
 
 
 def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, white: bool = False) -> Figure:

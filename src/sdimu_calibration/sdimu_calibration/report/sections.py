@@ -168,7 +168,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
             quiet(
                 "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
                 "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect; "
-                "below it stands what looks the same, each with its probability."
+                "what looks the same shares its bar, each with its probability."
             ),
         ),
         folded("Steps of the search", ladder(d)),
