@@ -19,7 +19,7 @@ ARGUMENTS = (
     ("imu", "", "data sheet of the IMU: name in config/imu or path; learned from the rests when empty"),
     ("site", "", "place of the test: name in config/site or path"),
     ("model", "baseline", "model to estimate: name in config/model or path"),
-    ("out", "out/replay", "folder of result.json"),
+    ("out", "out/replay", "folder of result.json, diagnosis.json and report.html"),
 )
 
 
@@ -44,7 +44,7 @@ def generate_launch_description():
                 executable="calibration_node",
                 name="calibration",
                 namespace=namespace,
-                parameters=[calibrating],
+                parameters=[calibrating | {"report": True}],
                 output="screen",
             ),
             Node(

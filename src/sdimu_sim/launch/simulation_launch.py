@@ -99,6 +99,7 @@ def generate_launch_description():
                     "out": out,
                     "gyro_unit": "rad/s",
                     "gyro_sign": 1,
+                    "report": True,
                 },
             ),
             node(
