@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -148,17 +148,23 @@ class Ros2:
 
     def __call__(self, words: str, *more: str, within_s: float = 60.0) -> str:
         """Run a command to its end; what it printed."""
-        done = subprocess.run(
+        process = subprocess.Popen(
             [self.program, *words.split(), *more],
             env=self.environment,
             cwd=self.folder,
-            timeout=within_s,
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             text=True,
-            check=False,
+            start_new_session=True,
         )
-        assert done.returncode == 0, f"ros2 {words}: {done.stdout}{done.stderr}"
-        return done.stdout + done.stderr
+        try:
+            told, _ = process.communicate(timeout=within_s)
+        finally:
+            # What it has started ends with it.
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        assert process.returncode == 0, f"ros2 {words}: {told}"
+        return told
 
     @contextmanager
     def running(self, words: str, *more: str) -> Iterator[subprocess.Popen[bytes]]:
@@ -233,11 +239,18 @@ def test_a_launch_of_the_simulation_leaves_what_a_run_leaves(ros2: Ros2, machine
     given = [f"plan:={machine.plan}", f"out:={out}", "allow_motion:=true"]
     if drive == "adaptive":
         goals = ros2.folder / "goals.yaml"
-        goals.write_text("format: sdimu-goal/1\nminutes: 2\nlimits: {accel_bias_z: 5000 ug}\n")
+        goals.write_text("format: sdimu-goal/1\nname: rough\nminutes: 3\nlimits: {accel_bias: 5000 ug}\n")
         given.append(f"goals:={goals}")
     given += [f"drive:={drive}"] if drive else []
     ros2("launch sdimu_sim simulation_launch.py", *given, within_s=DEADLINE_S)
     assert RESULTS | {"bag", "truth.yaml"} <= left(out)
+
+
+@pytest.mark.ros
+def test_a_launch_ends_when_a_node_has_failed(ros2: Ros2):
+    told = ros2("launch sdimu_sim simulation_launch.py", "goals:=none", "drive:=adaptive", within_s=DEADLINE_S)
+    assert "goal" in told
+    assert "adaptive" in told.split("has failed")[0]
 
 
 @pytest.mark.ros

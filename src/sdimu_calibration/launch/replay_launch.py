@@ -5,7 +5,8 @@ For example:
     ros2 launch sdimu_calibration replay_launch.py bag:=my_bag speed:=10.0
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, RegisterEventHandler, Shutdown
+from launch.event_handlers import OnProcessExit
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -28,6 +29,11 @@ def argument(name, kind=str):
     return ParameterValue(LaunchConfiguration(name), value_type=kind)
 
 
+def ended(event, _):
+    """End the others, which would wait for a node that has failed."""
+    return [Shutdown(reason=f"{event.process_name} has failed")] if event.returncode else []
+
+
 def generate_launch_description():
     """Declare the arguments and start player and calibration."""
     namespace = LaunchConfiguration("namespace")
@@ -39,6 +45,7 @@ def generate_launch_description():
                 DeclareLaunchArgument(name, default_value=default, description=text)
                 for name, default, text in ARGUMENTS
             ),
+            RegisterEventHandler(OnProcessExit(on_exit=ended)),
             Node(
                 package="sdimu_calibration",
                 executable="calibration_node",
