@@ -10,7 +10,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.design.palette import DIVERGING
-from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
@@ -184,10 +184,10 @@ def _family_ink(label: str) -> str:
 def _bar_name(entry: data.Scored, shares: Mapping[str, str]) -> str:
     """Label of a bar: a triangle at what was found, and what it may be instead below it."""
     if not entry.chosen:
-        return entry.label
+        return literal(entry.label)
     own = entry.label.partition("(")[0]
-    lines = [f"\N{BLACK RIGHT-POINTING TRIANGLE} {entry.label} {shares.get(own, '')}".rstrip()]
-    lines += [f"or {name} {p}" for name, p in shares.items() if name != own]
+    lines = [f"\N{BLACK RIGHT-POINTING TRIANGLE} {literal(entry.label)} {shares.get(own, '')}".rstrip()]
+    lines += [f"or {literal(name)} {p}" for name, p in shares.items() if name != own]
     return "<br>".join(lines)
 
 
@@ -198,6 +198,7 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, whit
     a memory was learned, and that the errors are not in it.
     """
     figure = Figure()
+    names = [literal(name) for name in names]
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
         figure.add(
@@ -264,7 +265,7 @@ def explained(parts: Sequence[data.Explained]) -> Figure:
 
 def correlation(names: Sequence[str], C: Floats) -> Figure:
     """Correlation of the coefficients; cells beyond one half carry their number."""
-    shown = [name.replace("_", " ") for name in names]
+    shown = [literal(name.replace("_", " ")) for name in names]
     text = [
         [f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
         for i, row in enumerate(C)
