@@ -269,6 +269,7 @@ def test_a_driver_is_calibrated_asked_and_saved_by_the_documented_commands(ros2:
     given = ["imu_topic:=/my_imu/data", "imu:=dtg", "site:=daejeon", f"out:={out}"]
     playing = ["-p", f"bag:={bag}", "-p", "speed:=1.0", "-p", "consumers:=1"]
     with ros2.running(begin, *given), ros2.running(driver, *playing):
+        wait(lambda: "/calibration/estimates" in ros2("topic list"), "the calibration node")
         assert "gyro_bias_x" in ros2("topic echo /calibration/estimates --once", within_s=DEADLINE_S)
         assert "effects beyond the model's" in ros2("param describe /calibration add")
         assert "successful" in ros2("param set /calibration add", "['gyro_scale_asymmetry_y']")
@@ -292,6 +293,7 @@ def test_a_table_moves_by_the_documented_commands_and_not_without(ros2: Ros2, ma
     begin = "launch sdimu_calibration driver_launch.py"
     with ros2.running(table), ros2.running("run sdimu_sim sdimu_node --ros-args", "-p", f"truth_file:={out}.yaml"):
         with ros2.running(begin, *given):
+            wait(lambda: "/table_goals/question" in ros2("topic list"), "the table's driver")
             assert "deg" in ros2("topic echo /table_goals/question --once --full-length", within_s=DEADLINE_S)
             assert "success=True" in ros2("service call /table_goals/confirm std_srvs/srv/SetBool", "{data: true}")
             assert "success=True" in ros2("service call /rate_table/hold std_srvs/srv/Trigger")

@@ -90,7 +90,8 @@ class Diagnosing:
         try:
             answer = self._stops.answer()
         except DataError as error:
-            self._warn(str(error))
+            missing = f"; {self._report} gets no {DIAGNOSIS} and no {REPORT}" if self._report else ""
+            self._warn(f"{error}{missing}")
             self.close()
             return
         if answer is None:
