@@ -31,6 +31,9 @@ LONG = {
         "test_probabilities_come_true_where_the_world_is_as_the_prior_says",
     ),
     "test/sdimu_calibration/report/workbench/test_guard.py": ("test_a_bad_state_shows_a_page_and_says_what_is_wrong",),
+    "test/ros/test_live_diagnosis.py": (
+        "test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted",
+    ),
     "test/sdimu_calibration/api/test_api.py": (
         "test_a_coefficient_knows_its_units",
         "test_a_handheld_fit_takes_no_assumed_site",

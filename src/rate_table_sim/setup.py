@@ -22,7 +22,7 @@ setup(
     python_requires=">=3.11",
     packages=find_packages(),
     package_data={NAME: ["py.typed"]},
-    install_requires=["numpy>=2.0", "pydantic>=2", "scipy", f"sdimu_calibration=={VERSION}"],
+    install_requires=["numpy>=1.26", "pydantic>=2", "scipy", f"sdimu_calibration=={VERSION}"],
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

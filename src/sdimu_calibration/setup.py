@@ -27,7 +27,7 @@ RUN_TIME = [
     "lz4",
     "mcap",
     "numba",
-    "numpy>=2.0",
+    "numpy>=1.26",
     "pydantic>=2",
     "rich",
     "ros-jazzy-common-interfaces",

@@ -25,7 +25,7 @@ setup(
     package_data={NAME: ["py.typed"]},
     install_requires=[
         "PyYAML",
-        "numpy>=2.0",
+        "numpy>=1.26",
         "pydantic>=2",
         "rich",
         "scipy",

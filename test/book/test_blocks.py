@@ -13,6 +13,8 @@ pytestmark = pytest.mark.timeout(1800)
 
 TUTORIALS = sorted((ROOT / "doc" / "tutorials").glob("*.md"))
 LIVE = "live"
+DOWNLOADED = {"public-recording": ("nilspod/ferraris_session.csv", "example_ferraris_session.csv")}
+"""What the reader of a tutorial downloads: where it lies among the recordings, and its name on the page."""
 STAYS = ("sdimu workbench", "sdimu watch")
 """Run until they are stopped: the tests in a browser and those of the live diagnosis hold them."""
 
@@ -22,9 +24,12 @@ STAYS = ("sdimu workbench", "sdimu watch")
     [pytest.param(p, marks=pytest.mark.ros if p.stem == LIVE else ()) for p in TUTORIALS],
     ids=lambda page: page.stem,
 )
-def test_a_tutorial_runs_as_it_stands(page, tmp_path):
+def test_a_tutorial_runs_as_it_stands(page, tmp_path, recorded):
     blocks = fenced(page)
     assert blocks
+    if page.stem in DOWNLOADED:
+        name, here = DOWNLOADED[page.stem]
+        shutil.copyfile(recorded(name), tmp_path / here)
     run(blocks, tmp_path)
 
 

@@ -87,6 +87,21 @@ class DeclareLaunchArgument:
     description: str = field(kw_only=True)
 
 
+@dataclass
+class RegisterEventHandler:
+    event_handler: Any
+
+
+@dataclass(kw_only=True)
+class OnProcessExit:
+    on_exit: Any
+
+
+@dataclass(kw_only=True)
+class Shutdown:
+    reason: str
+
+
 @dataclass(kw_only=True)
 class Node:
     package: str
@@ -126,7 +141,12 @@ def modules() -> Iterator[None]:
     """Put the stand-ins where launch files import from."""
     made = {
         "launch": {"LaunchDescription": LaunchDescription},
-        "launch.actions": {"DeclareLaunchArgument": DeclareLaunchArgument},
+        "launch.actions": {
+            "DeclareLaunchArgument": DeclareLaunchArgument,
+            "RegisterEventHandler": RegisterEventHandler,
+            "Shutdown": Shutdown,
+        },
+        "launch.event_handlers": {"OnProcessExit": OnProcessExit},
         "launch.conditions": {"IfCondition": IfCondition},
         "launch.substitutions": {
             "LaunchConfiguration": LaunchConfiguration,

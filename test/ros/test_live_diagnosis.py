@@ -78,6 +78,16 @@ def whole(job: Job) -> LiveDiagnosis:
     return Diagnoser(job).answer(WorkerRequest(5, None)).diagnosis
 
 
+def test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted(job, tmp_path):
+    wanted = replace(job, report=tmp_path)
+    assert Diagnoser(wanted).answer(WorkerRequest(5, None, report=True)).unreported == ""
+    found = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert any(EFFECT in candidate["effect"] for candidate in found["candidates"])
+    assert "<html" in (tmp_path / "report.html").read_text()
+    missing = replace(wanted, journal=tmp_path / "none")
+    assert "journal" in Diagnoser(missing).answer(WorkerRequest(5, None, report=True)).unreported
+
+
 def stop_end(raw: RawTest, stop: int) -> int:
     return int(raw.status.ns[(raw.status.stop == stop) & raw.status.dwell].max())
 

@@ -4,7 +4,8 @@
     ros2 launch sdimu_calibration driver_launch.py table:=my_table.yaml allow_motion:=true ask:=true \\
         joint_trajectory:=/table_controller/joint_trajectory joint_states:=/joint_states
 
-The node leaves nothing on its own: ros2 service call /calibration/save std_srvs/srv/Trigger writes result.json.
+The node leaves nothing on its own: ros2 service call /calibration/save std_srvs/srv/Trigger writes result.json, then
+diagnosis.json and report.html.
 """
 
 from launch.actions import DeclareLaunchArgument
@@ -27,7 +28,7 @@ ARGUMENTS = (
     ("gyro_unit", "", "unit of the body rate in the messages; recognised when empty"),
     ("accel_sign", "0", "sign of the specific force in the messages, 1 or -1; 0 recognises it"),
     ("gyro_sign", "0", "sign of the body rate in the messages, 1 or -1; 0 recognises it"),
-    ("diagnose", "true", "diagnose at the end of each stop"),
+    ("diagnose", "true", "diagnose at the end of each stop, and leave diagnosis.json and report.html with a result"),
     ("out", "out/driver", "folder of bag and results"),
     ("table", "", "a table to drive: name in config/table or path; none when empty"),
     ("drive", "plan", "plan: carry out the plan; adaptive: the test chooses its turns"),
@@ -76,7 +77,9 @@ def generate_launch_description():
                 executable="calibration_node",
                 name="calibration",
                 namespace=namespace,
-                parameters=[reading | {"out": out, "stay": True, "diagnose": argument("diagnose", bool)}],
+                parameters=[
+                    reading | {"out": out, "stay": True, "report": True, "diagnose": argument("diagnose", bool)}
+                ],
                 output="screen",
             ),
             Node(

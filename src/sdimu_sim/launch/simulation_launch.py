@@ -7,8 +7,9 @@ For example:
     ros2 launch sdimu_sim simulation_launch.py drive:=adaptive allow_motion:=true    # the test chooses its turns
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, RegisterEventHandler, Shutdown
 from launch.conditions import IfCondition
+from launch.event_handlers import OnProcessExit
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -36,6 +37,11 @@ ARGUMENTS = (
 def argument(name, kind=str):
     """Return the value of a launch argument as a parameter of that type."""
     return ParameterValue(LaunchConfiguration(name), value_type=kind)
+
+
+def ended(event, _):
+    """End the others, which would wait for a node that has failed."""
+    return [Shutdown(reason=f"{event.process_name} has failed")] if event.returncode else []
 
 
 def generate_launch_description():
@@ -79,6 +85,7 @@ def generate_launch_description():
                 DeclareLaunchArgument(name, default_value=default, description=text)
                 for name, default, text in ARGUMENTS
             ),
+            RegisterEventHandler(OnProcessExit(on_exit=ended)),
             node(
                 "sdimu_calibration",
                 "recorder_node",
@@ -99,6 +106,7 @@ def generate_launch_description():
                     "out": out,
                     "gyro_unit": "rad/s",
                     "gyro_sign": 1,
+                    "report": True,
                 },
             ),
             node(

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 from plotly.subplots import make_subplots
 
+from sdimu_calibration.report import evidence_figures
 from sdimu_calibration.report.design.palette import LIGHT, palette
 from sdimu_calibration.report.drawing import Figure, html, lay_out
 from sdimu_calibration.report.fleet.figures import _panel
+from sdimu_calibration.report.workbench import figures as workbench_figures
 
 
 @pytest.mark.parametrize(("rows", "cols"), [(1, 1), (4, 3), (6, 2)])
@@ -99,3 +101,18 @@ def test_a_serial_number_is_shown_as_it_is_and_not_as_markup():
     shown = figure.data[0]["text"]
     assert not [text for text in shown if "<" in text]
     assert tuple(unescape(text) for text in shown) == serials
+
+
+def test_marks_in_names_of_the_user_are_shown_and_not_obeyed():
+    """Names of folders, effect files, coefficients and joints come from files of others."""
+    name = 'own <b>bold</b> <a href="https://elsewhere">here</a>'
+    figures = (
+        evidence_figures.rungs(["as given", name], [2.0, 1.0]),
+        evidence_figures.correlation([name, "gyro_bias_x"], np.eye(2)),
+        workbench_figures.ladder(["as given", name], [2.0, 1.0], [None, None]),
+    )
+    for figure in figures:
+        said = repr((figure.data, figure.layout))
+        assert "&lt;b&gt;" in said
+        assert "<b>bold" not in said
+        assert "<a href" not in said

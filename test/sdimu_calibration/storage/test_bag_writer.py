@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_folder import file_states
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -134,3 +137,15 @@ def test_a_stamp_before_1970_is_kept_and_filed_at_the_beginning(tmp_path: Path):
         found = [(t, raw) for _, t, raw in reader.messages()]
     assert [t for t, _ in found] == [0, 0, 1_000_000_000]
     assert cdr.decode_imu([raw for _, raw in found])[0].tolist() == ns.tolist()
+
+
+def test_a_file_that_was_written_into_with_its_times_kept_is_another(tmp_path):
+    """A copy that keeps times: the same size, the same number on the disk, the same time of the last change."""
+    file = tmp_path / "bag.mcap"
+    file.write_bytes(b"one recording")
+    kept, before = file.stat(), file_states(file)
+    assert file_states(file) == before
+    time.sleep(0.02)
+    file.write_bytes(b"an other one.")
+    os.utime(file, ns=(kept.st_atime_ns, kept.st_mtime_ns))
+    assert file_states(file) != before

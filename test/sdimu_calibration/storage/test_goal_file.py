@@ -21,3 +21,11 @@ def test_a_test_that_would_not_end_is_refused(tmp_path, minutes):
     path.write_text(f"format: sdimu-goal/1\nminutes: {minutes}\nlimits: {{gyro_bias: 0.016 deg/h}}\n")
     with pytest.raises(DataError, match="minutes: "):
         load_goals(path)
+
+
+def test_a_name_that_a_terminal_would_obey_is_written_out(tmp_path):
+    path = tmp_path / "goal.yaml"
+    path.write_text('format: sdimu-goal/1\nname: "quick\\n\\e[31mred"\nlimits: {gyro_bias: 0.016 deg/h}\n')
+    name = load_goals(path).name
+    assert name.isprintable()
+    assert name.startswith("quick")

@@ -7,11 +7,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.processes import own_domain, own_folder
 from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_plan
-from sdimu_sim.cli.run import LiveTest, _clear, _write_plan, run, without_scolding
+from sdimu_sim.cli.run import LiveTest, _clear, _tell_choices, _write_plan, run, without_scolding
 
 
 @pytest.fixture
@@ -115,3 +116,13 @@ def test_turns_that_the_test_chose_itself_are_not_scolded():
     )
     assert without_scolding(told, "table33").advice == (kept,)
     assert without_scolding(told, None) == told
+
+
+@pytest.mark.parametrize(
+    "choices", ["[]", "[1]", "{}", '[{"text": "end"}]', '[{"until_s": "x", "text": "", "reached": true}]']
+)
+def test_choices_that_are_none_are_refused_in_one_line(tmp_path, choices):
+    path = tmp_path / "choices.json"
+    path.write_text(f'{{"format": "sdimu-choices/1", "choices": {choices}}}')
+    with pytest.raises(DataError, match=r"choices\.json: choices: expected"):
+        _tell_choices(plain(), path)

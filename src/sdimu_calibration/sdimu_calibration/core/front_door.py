@@ -28,6 +28,7 @@ from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.imu_class import propose
 from sdimu_calibration.core.data.latitude_check import assumption, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.status_clock import aligned
+from sdimu_calibration.core.data.whole_steps import without_whole_steps
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site
@@ -180,7 +181,7 @@ def _placed(recording: Recording, imu: ImuSpecification, options: OpeningOptions
     """Find rests that no status says, and compare the site with the Earth's rate and gravity in the data."""
     site, seen = options.site, None
     if len(recording.t) >= FEWEST:
-        recording = with_detected_dwells(recording, imu)
+        recording = without_whole_steps(with_detected_dwells(recording, imu))
         seen = observe_earth_rate(recording.t, recording.omega_ib_b, recording.f_ib_b, imu)
     assumed = options.assumed_site
     notes = [assumption(assumed, site, seen, where)] if assumed else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -153,10 +154,14 @@ class ClockStep(NamedTuple):
         Time of the first sample after it (s after the start of the recording).
     size_s : float
         How far the clock was set on; below zero: back (s).
+    open : float
+        Sigma of the angle that was turned in the length of the step, as a share of it: 1 / sqrt(3) where the driver may
+        have paused instead, less where gravity tells.
     """
 
     t: float
     size_s: float
+    open: float = 1.0 / math.sqrt(3.0)
 
     def __str__(self) -> str:
         """Say it in a few words."""

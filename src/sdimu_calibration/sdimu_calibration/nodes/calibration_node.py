@@ -71,6 +71,8 @@ CATCH_UP_S = 0.025
 """Time (s) between two ticks for a filter that is made anew: half of it, the other half is for samples."""
 DIAGNOSIS_S = 120.0
 """Time (s) after the result for which the last diagnosis is awaited: minutes are a day of data."""
+REPORT_S = 900.0
+"""Time (s) after the result for which its files are awaited: the diagnosis is made twice, the second time in full."""
 GRAVITY = 9.8
 _NEARLY_NS = 1_000
 """A status this much before the last sample is the one that belongs to it (ns)."""
@@ -125,7 +127,10 @@ class CalibrationNode:
             Listener(node, ticker, Imu, self._topics.imu, self._take_imu, raw=True, late=bool(resumed)),
         )
         diagnose = declare.flag("diagnose", True, "publish a diagnosis at the end of each stop")
-        job = Job(self._journal.place, self._options, model) if diagnose else None
+        report = declare.flag("report", False, "with diagnose: leave diagnosis.json and report.html at the end")
+        self._patience_s = REPORT_S if report else DIAGNOSIS_S
+        place = self._out if report else None
+        job = Job(self._journal.place, self._options, model, report=place) if diagnose else None
         self._diagnosing = Diagnosing(node, job, added, self._warn)
         node.add_on_set_parameters_callback(self._check_added)
         node.add_post_set_parameters_callback(self._take_added)
@@ -252,7 +257,7 @@ class CalibrationNode:
         self._take_model(CATCH_UP_S)
         self._diagnosing.tick(self._feed.imu_ns)
         if self._result is not None and self._departed is None:
-            if self._diagnosing.idle or time.monotonic() - self._concluded > DIAGNOSIS_S:
+            if self._diagnosing.idle or time.monotonic() - self._concluded > self._patience_s:
                 self._depart(self._result)
         elif self._ended is not None and self._departed is None:
             status = self._feed.status
@@ -279,7 +284,6 @@ class CalibrationNode:
         for estimate in self._feed.process(False, False, final=True):
             self._publish(estimate)
         self._tell_notes()
-        self._diagnosing.end()
         try:
             self._result, self._concluded = self._write_result(), time.monotonic()
         except DataError as error:
@@ -289,6 +293,8 @@ class CalibrationNode:
                 self.node.get_logger().error(str(error))
             elif not self.done.done():
                 self.done.set_exception(error)
+        # A report is of the result beside it.
+        self._diagnosing.end()
 
     def _depart(self, result: Calibration) -> None:
         """Publish the result as the last word."""
@@ -309,6 +315,7 @@ class CalibrationNode:
         try:
             self._take_model()
             self._write_result()
+            self._diagnosing.report()
             response.success, response.message = True, str(self._out / "result.json")
         except (DataError, OSError) as error:
             response.success, response.message = False, str(error)

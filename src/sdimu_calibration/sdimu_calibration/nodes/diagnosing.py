@@ -20,6 +20,7 @@ from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
 from sdimu_calibration.nodes.live_diagnosis import StopDiagnosis, Worker
+from sdimu_calibration.nodes.live_report import DIAGNOSIS, REPORT
 from sdimu_calibration.report.live_text import diagnosis_line
 
 
@@ -44,6 +45,7 @@ class Diagnosing:
     def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:
         self._node, self._warn = node, warn
         self._stops = StopDiagnosis(Worker(job), added) if job else None
+        self._report = job.report if job else None
         self.last: Answer | None = None
         # Few and telling: who comes late gets them all.
         self._diagnosis = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
@@ -62,9 +64,14 @@ class Diagnosing:
             self._stops.take(e)
 
     def end(self) -> None:
-        """Ask for the diagnosis of everything."""
+        """Ask for the diagnosis of everything, and for its files: ask once result.json is written."""
         if self._stops:
             self._stops.end()
+
+    def report(self) -> None:
+        """Ask for the files of what there is, where the job wants any; the result.json that they are of is written."""
+        if self._report is not None:
+            self.end()
 
     def change_model(self, added: tuple[str, ...]) -> None:
         """Diagnose again with other effects added."""
@@ -83,7 +90,8 @@ class Diagnosing:
         try:
             answer = self._stops.answer()
         except DataError as error:
-            self._warn(str(error))
+            missing = f"; {self._report} gets no {DIAGNOSIS} and no {REPORT}" if self._report else ""
+            self._warn(f"{error}{missing}")
             self.close()
             return
         if answer is None:
@@ -103,6 +111,12 @@ class Diagnosing:
         publish(self._diagnosis, messages.diagnosis(stamp_ns, found))
         line = diagnosis_line(found)
         self._node.get_logger().info(f"diagnosis of {line} ({answer.seconds:.1f} s after it was asked)")
+        if self._report is None or not answer.request.report:
+            return
+        if answer.unreported:
+            self._warn(f"{self._report}: no {DIAGNOSIS} and {REPORT}: {answer.unreported}")
+        else:
+            self._node.get_logger().info(f"{self._report}: {DIAGNOSIS} and {REPORT} are there")
 
     def close(self) -> None:
         """End the process that diagnoses."""

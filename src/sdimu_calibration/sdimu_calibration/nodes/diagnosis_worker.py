@@ -22,6 +22,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.nodes.live_report import leave_report
 from sdimu_calibration.report.live_picture import live_picture
 from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import read_journal
@@ -47,6 +48,8 @@ class Job:
         `pickle`.
     pictures : bool
         Draw each diagnosis.
+    report : Path, optional
+        Folder that gets diagnosis.json and report.html at the end of the test.
     """
 
     journal: Path
@@ -54,6 +57,7 @@ class Job:
     model: str
     question: Question | None = None
     pictures: bool = True
+    report: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,8 @@ class WorkerRequest:
         What was added to the model, one entry for each model that the test has had, the one in use last.
     about : object
         For the question.
+    report : bool
+        Leave the files of `Job.report`, too.
     asked : float
         When (s of the monotonic clock, which all processes share).
     """
@@ -76,6 +82,7 @@ class WorkerRequest:
     until_ns: int | None
     models: tuple[tuple[str, ...], ...] = ((),)
     about: Any = None
+    report: bool = False
     asked: float = field(default_factory=time.monotonic)
 
 
@@ -91,6 +98,8 @@ class Answer:
         From the request to the answer.
     reached_ns : int
         Stamp of the last sample that was looked at (ns); 0 where there was none.
+    unreported : str
+        Why the files of `Job.report` are not there; empty where they are, or none are wanted.
     """
 
     request: WorkerRequest
@@ -98,6 +107,7 @@ class Answer:
     more: Any
     seconds: float
     reached_ns: int
+    unreported: str = ""
 
 
 @dataclass(frozen=True)
@@ -131,7 +141,7 @@ class Diagnoser:
 
     def answer(self, request: WorkerRequest) -> Answer:
         """Diagnose what there is; a diagnosis that waits where that is not possible yet."""
-        more, added = None, request.models[-1]
+        more, added, unreported = None, request.models[-1], ""
         try:
             test = self._opened(request.until_ns)
             earlier = [self._error(test, models) for models in request.models[:-1]]
@@ -139,10 +149,23 @@ class Diagnoser:
             self._errors[added] = found.ladder[-1]
             if self._job.question is not None:
                 more = self._job.question(fit, found, request.about)
+            if request.report:
+                unreported = self._report(test, added)
         except DataError as error:
             until_s = float(self._test[1].recording.t[-1]) if self._test else 0.0
-            found = waiting(request.stop, until_s, added, str(error))
-        return Answer(request, found, more, time.monotonic() - request.asked, self._reached_ns)
+            found, unreported = waiting(request.stop, until_s, added, str(error)), str(error)
+        return Answer(request, found, more, time.monotonic() - request.asked, self._reached_ns, unreported)
+
+    def _report(self, test: PreparedTest, added: tuple[str, ...]) -> str:
+        """Leave the files of the whole test where they are wanted; why that was not possible."""
+        if self._job.report is None:
+            return ""
+        try:
+            name = " + ".join((self._job.model, *added))
+            leave_report(self._job.report, test, extended_model(self._job.model, added), name)
+        except (DataError, OSError) as error:
+            return str(error)
+        return ""
 
     def _error(self, test: PreparedTest, added: tuple[str, ...]) -> ModelError:
         if added not in self._errors:

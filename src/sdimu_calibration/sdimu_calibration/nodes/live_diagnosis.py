@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing import Pipe
 from typing import Any
 
@@ -42,8 +43,9 @@ class Worker:
         return self._busy is None and self._next is None
 
     def ask(self, request: WorkerRequest) -> None:
-        """Take a request in place of the one that waits."""
-        self._next = request
+        """Take a request in place of the one that waits; a report that was asked for stays asked for."""
+        waits = self._next is not None and self._next.report
+        self._next = replace(request, until_ns=None, report=True) if waits else request
         self._send()
 
     def _send(self) -> None:
@@ -109,9 +111,9 @@ class StopDiagnosis:
             self._rest_ns = 0
 
     def end(self) -> None:
-        """Ask for the diagnosis of everything."""
+        """Ask for the diagnosis of everything, and its files."""
         self._rest_ns = 0
-        self._ask(self._stop, None)
+        self._ask(self._stop, None, report=True)
 
     def change_model(self, added: tuple[str, ...]) -> None:
         """Ask for the last diagnosis again, with other effects added; the ladder gets a rung."""
@@ -124,9 +126,9 @@ class StopDiagnosis:
         self._models, self._last = self._models[-1:], None
         self._stop, self._rest_ns = 0, 0
 
-    def _ask(self, stop: int, until_ns: int | None) -> None:
+    def _ask(self, stop: int, until_ns: int | None, report: bool = False) -> None:
         self._last = stop, until_ns
-        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), self.about))
+        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), self.about, report))
 
     def answer(self) -> Answer | Picture | None:
         """Return a diagnosis once it is there, then its picture; raises as `Worker.answer`."""

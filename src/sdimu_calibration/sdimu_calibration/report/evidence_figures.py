@@ -10,7 +10,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.design.palette import DIVERGING
-from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
@@ -113,7 +113,7 @@ def ranking(
     folded = {name for label, shares in told.items() for name in shares if name != label.partition("(")[0]}
     left = [s for s in data.best_variants(entries) if s.chosen or s.label.partition("(")[0] not in folded]
     shown = left[:_MOST_BARS]
-    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown]
+    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + literal(s.label) for s in shown]
     sizes = [with_sigma(s.estimate, s.sigma, s.unit) + _shares_in_words(s, told.get(s.label, {})) for s in shown]
     figure = Figure()
     figure.add(
@@ -187,7 +187,7 @@ def _family_ink(label: str) -> str:
 def _shares_in_words(entry: data.Scored, shares: Mapping[str, str]) -> str:
     """Say how probable a bar is, and what it may be instead; empty where it is told which effect it is."""
     own = entry.label.partition("(")[0]
-    others = [f"or {name} {p}" for name, p in shares.items() if name != own]
+    others = [f"or {literal(name)} {p}" for name, p in shares.items() if name != own]
     return "; ".join([f", {shares.get(own, '')}", *others]) if others else ""
 
 
@@ -198,6 +198,7 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, whit
     a memory was learned, and that the errors are not in it.
     """
     figure = Figure()
+    names = [literal(name) for name in names]
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
         figure.add(
@@ -264,7 +265,7 @@ def explained(parts: Sequence[data.Explained]) -> Figure:
 
 def correlation(names: Sequence[str], C: Floats) -> Figure:
     """Correlation of the coefficients; cells beyond one half carry their number."""
-    shown = [name.replace("_", " ") for name in names]
+    shown = [literal(name.replace("_", " ")) for name in names]
     text = [
         [f"{v:+.1f}".replace("-", "\N{MINUS SIGN}") if abs(v) > 0.5 and i != j else "" for j, v in enumerate(row)]
         for i, row in enumerate(C)

@@ -16,7 +16,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.recording import Recording, TableLog
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.report.design.library import as_script
-from sdimu_calibration.report.drawing import BAND, Figure, lay_out
+from sdimu_calibration.report.drawing import BAND, Figure, lay_out, literal
 from sdimu_calibration.report.markup import Draw, quiet, section
 
 _BLOCKS = 500
@@ -110,7 +110,7 @@ def sequence(table: TableLog, fit: Fit) -> Figure:
             x=table.t[rows] / 60.0,
             y=np.degrees(table.angle[rows, k]),
             mode="lines",
-            name=name.replace("_", " "),
+            name=literal(name.replace("_", " ")),
             line={"color": f"@{AXES[k % 3]}", "dash": ("solid", "dash", "dot")[k % 3]},
             hovertemplate="%{x:.1f} min: %{y:.2f} deg<extra>" + escape(name) + "</extra>",
         )

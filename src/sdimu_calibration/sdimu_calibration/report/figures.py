@@ -8,7 +8,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.palette import SERIES
-from sdimu_calibration.report.drawing import BAND, Figure, lay_out
+from sdimu_calibration.report.drawing import BAND, Figure, lay_out, literal
 from sdimu_calibration.report.groups import groups, is_free, short_name, title
 
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
@@ -63,13 +63,13 @@ def _draw(
         if not is_free(calibration, index):
             continue
         sigma, ink = np.where(sigma > 0, sigma, np.nan), SERIES[order % 6]
-        drawn.append((short_name(calibration.names[index], effect), sigma, ink))
+        drawn.append((literal(short_name(calibration.names[index], effect)), sigma, ink))
         figure.add(
             "scatter",
             x=history.t[kept] / 60.0,
             y=sigma,
             mode="lines",
-            name=calibration.names[index],
+            name=literal(calibration.names[index]),
             line={"color": ink, "dash": _DASHES[order % 6], "width": 1.6},
             hovertemplate=f"%{{y:.3g}} {unit}",
             **place,

@@ -375,13 +375,24 @@ def _is_file(name: str, file: Path) -> bool:
 
 def _tell_choices(console: Console, path: Path) -> dict[str, Any]:
     """Print every choice with its reason, and give the last one, which ended the test."""
+    from sdimu_calibration.core.plain_text import one_line
+    from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.json_file import read_json
 
-    choices: list[dict[str, Any]] = read_json(path, "sdimu-choices/1")["choices"]
+    choices = read_json(path, "sdimu-choices/1").get("choices")
+    if not isinstance(choices, list) or not choices or not all(_is_choice(choice) for choice in choices):
+        raise DataError(f"{path}: choices: expected those of an adaptive test; it was changed, or ended without one")
     for choice in choices:
         text = f"{choice['until_s'] / 60.0:5.1f} min  {choice['text']}"
-        console.print(text, soft_wrap=True, markup=False, highlight=False)
-    return choices[-1]
+        console.print(one_line(text), soft_wrap=True, markup=False, highlight=False)
+    end: dict[str, Any] = choices[-1]
+    return end
+
+
+def _is_choice(choice: object) -> bool:
+    """Whether an entry of choices.json has what is told of it."""
+    kinds = {"until_s": int | float, "text": str, "reached": bool}
+    return isinstance(choice, dict) and all(isinstance(choice.get(key), kind) for key, kind in kinds.items())
 
 
 def _say_measured(console: Console, out: Path, result: Calibration, streamed: float, wall: float) -> None:

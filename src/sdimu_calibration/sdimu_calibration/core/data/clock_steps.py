@@ -3,7 +3,7 @@
 Samples come evenly, so that their count is a clock. Missing samples set the stamps on by whole intervals; a step of the
 clock sets them on by any time, or back. What it stands for is not certain: a driver that paused leaves the same stamps.
 Samples are taken as even across the step, and the angle turned in its length is uncertain, as in a gap. A step on by
-whole intervals is what missing samples leave, and taken as such.
+whole intervals is what missing samples leave, and taken as such unless gravity tells it (`whole_steps`).
 """
 
 from __future__ import annotations

@@ -33,6 +33,9 @@ from sdimu_calibration.core.recording import ClockStep, DataError, DataFault
 from sdimu_calibration.core.results import NOT_TRUSTED
 from sdimu_calibration.core.wording import Work
 
+_TOLD = 0.5
+"""Ratio of the sigma of a step's angle to that angle from which a pause of the driver is not excluded: gravity leaves
+less."""
 GAP_SHARE = 0.1
 """Uncertainty of a bridged angle, as a share of it: a turn need not run on evenly."""
 LINEAR_RAD = 1e-3
@@ -143,7 +146,8 @@ def stepped(
     """Add what steps of the clock leave uncertain, and tell them.
 
     Where stamps go on, the angle that was turned in the length of the step is that between the samples or nothing, as
-    the driver paused or the clock was set: the sigma is that angle over the root of three. No pause sets stamps back.
+    the driver paused or the clock was set: the sigma is that angle over the root of three, or what gravity leaves
+    (`whole_steps`). No pause sets stamps back.
 
     Parameters
     ----------
@@ -158,10 +162,10 @@ def stepped(
         resting = bool(_rests(dwell, np.array([epoch]))[0])
         if not resting and step.size_s > 0.0:
             rate = float(np.linalg.norm(cycles.alpha[cycle])) / cycles.dt[cycle]
-            error = rate * abs(step.size_s) / math.sqrt(3.0)
+            error = rate * abs(step.size_s) * step.open
             angle[epoch] = math.hypot(angle[epoch], error)
             velocity[epoch] = math.hypot(velocity[epoch], gravity * abs(step.size_s) * error)
-        pause = ", or the driver paused" if step.size_s > 0.0 else ""
+        pause = ", or the driver paused" if step.size_s > 0.0 and step.open > _TOLD else ""
         text = f"{step} {'at rest' if resting else 'while the IMU turned'}{pause}: samples are taken as even"
         faults.append(DataFault("clock", text, 1, step.t, step.t))
     return Bridges(found.white, angle, velocity), tuple(faults)

@@ -189,7 +189,7 @@ def _vertical_rate(w: Floats, up: Floats, unbalance: float) -> tuple[float, floa
     y = np.sum(w * up, axis=1)
     if np.linalg.matrix_rank(design, tol=1e-2) < 4:
         return untold
-    x, *_ = np.linalg.lstsq(design, y)
+    x, *_ = np.linalg.lstsq(design, y, rcond=None)
     dof = len(y) - 4
     scatter = float(np.sum((y - design @ x) ** 2)) / dof * float(np.linalg.inv(design.T @ design)[3, 3])
     variance = scatter + unbalance**2 / 3.0

@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.workbench.axes import TIME
 from sdimu_calibration.report.workbench.fit import Fitted
 
@@ -106,7 +106,7 @@ def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, agai
             x=broken[0],
             y=broken[1],
             mode="lines" if against == TIME else "markers",
-            name=f"{curve.name} would take",
+            name=f"{literal(curve.name)} would take",
             line={"color": BEFORE, "width": 3},
             hoverinfo="skip",
             marker={"color": BEFORE, "size": 7, "symbol": "diamond"},
@@ -159,7 +159,7 @@ def _left(fitted: Fitted) -> set[int]:
 def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None]) -> Figure:
     """Error of each fit with one stop left out, less one, on a scale of powers: a small step is seen, too."""
     figure = Figure()
-    short = [name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}" for name in names]
+    short = [literal(name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}") for name in names]
     figure.add(
         "scatter",
         y=short,
@@ -171,7 +171,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
         line={"color": AFTER},
         marker={"size": 9},
         cliponaxis=False,
-        customdata=list(names),
+        customdata=[literal(name) for name in names],
         hovertemplate="%{customdata}: %{x:.3f} sigma<extra></extra>",
     )
     if any(v is not None for v in at_held):

@@ -16,15 +16,16 @@ _SQLITE = ("-wal", "-shm", "-journal")
 """At the names of what SQLite leaves beside its files."""
 
 
-FileState = tuple[Path, int, int, int]
-"""A file as it is now: path, size (bytes), time of its last change (ns), number on its disk."""
+FileState = tuple[Path, int, int, int, int]
+"""A file as it is now: path, size (bytes), time of its last change (ns), number on its disk, and the time (ns) that no
+program sets: a copy that keeps times, written into the file, shows there alone."""
 
 
 def file_states(path: Path) -> tuple[FileState, ...]:
     """Return what tells that a file, or one in a folder, was changed; empty where nothing is there."""
     files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.exists() else []
     found = ((file, file.stat()) for file in files)
-    return tuple((file, now.st_size, now.st_mtime_ns, now.st_ino) for file, now in found)
+    return tuple((file, now.st_size, now.st_mtime_ns, now.st_ino, now.st_ctime_ns) for file, now in found)
 
 
 def check_room(path: Path, replace: bool) -> None:

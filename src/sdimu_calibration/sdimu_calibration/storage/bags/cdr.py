@@ -311,7 +311,7 @@ def _decode_block(block: Block, number: int, parts: Sequence[slice]) -> tuple[St
         raise LayoutError("other layout")
     second, nanosecond = block.field(4, "<i4")[:, 0], block.field(8, "<u4")[:, 0]
     columns = [block.field(start + 8 * part.start, "<f8", part.stop - part.start) for part in parts]
-    return second * np.int64(1_000_000_000) + nanosecond, columns
+    return second.astype(np.int64) * 1_000_000_000 + nanosecond, columns
 
 
 class _Cursor:

@@ -11,11 +11,12 @@ import os
 import re
 import reprlib
 from collections.abc import Hashable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.plan import Plan, Turn
@@ -287,9 +288,13 @@ class _TurnFile(Schema):
     dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
 
 
+Name = Annotated[str, AfterValidator(partial(one_line, longest=200))]
+"""What a file calls itself: on one line of printable characters wherever it is shown."""
+
+
 class _PlanFile(Schema):
     format: Literal["sdimu-plan/1"] = "sdimu-plan/1"
-    name: str | None = None
+    name: Name | None = None
     dwell: Annotated[float, quantity("s"), Field(gt=0)]
     first_dwell: Annotated[float, quantity("s"), Field(gt=0)] | None = None
     rate: Annotated[float, quantity("deg/s"), Field(gt=0)]
@@ -310,7 +315,7 @@ class _NoiseFile(Schema):
 
 class _ImuFile(Schema):
     format: Literal["sdimu-imu/1"] = "sdimu-imu/1"
-    name: str | None = None
+    name: Name | None = None
     grade: Literal["navigation", "tactical", "mems"] = "navigation"
     noise: _NoiseFile
     prior: dict[str, Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]] = {}
@@ -323,7 +328,7 @@ class _PriorFile(Schema):
 
 class _ModelFile(Schema):
     format: Literal["sdimu-model/1"] = "sdimu-model/1"
-    name: str | None = None
+    name: Name | None = None
     effects: tuple[str, ...] = Field(min_length=1)
     velocity_sigma: Annotated[float, quantity("m/s"), Field(gt=0)] = Model.velocity_sigma
     position_sigma: Annotated[float, quantity("m"), Field(gt=0)] = Model.position_sigma
@@ -334,7 +339,7 @@ class _ModelFile(Schema):
 
 class _SiteFile(Schema):
     format: Literal["sdimu-site/1"] = "sdimu-site/1"
-    name: str | None = None
+    name: Name | None = None
     latitude_deg: Annotated[float, _number_of("deg"), Field(ge=-90.0, le=90.0)]
     height_m: Annotated[float, _number_of("m"), Field(ge=-5000.0, le=20000.0)]
     gravity_m_s2: Annotated[float, _number_of("m/s^2"), Field(gt=9.5, lt=10.0)] | None = None

@@ -11,12 +11,12 @@ from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError, parse_quantity
-from sdimu_calibration.storage.files.config import LONGEST_PLAN_S, Schema, find_config, read_yaml
+from sdimu_calibration.storage.files.config import LONGEST_PLAN_S, Name, Schema, find_config, read_yaml
 
 
 class _GoalFile(Schema):
     format: Literal["sdimu-goal/1"] = "sdimu-goal/1"
-    name: str | None = None
+    name: Name | None = None
     minutes: Annotated[float, Field(gt=0, le=LONGEST_PLAN_S / 60.0)] = 60.0
     limits: dict[str, str]
 
