@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -101,3 +102,26 @@ def test_a_family_surer_than_the_class_is_told_with_its_members_each_once_by_one
         ("accel_scale_x", 0.28),
         ("accel_cubic_x", 0.1),
     ]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "error", "tone"),
+    [
+        (Verdict.ONE_EFFECT, 1.0, "doubtful"),
+        (Verdict.UNEXPLAINED, 1.0, "bad"),
+        (Verdict.CONSISTENT, 1.0, "good"),
+        (Verdict.CONSISTENT, 1.25, "doubtful"),
+    ],
+)
+def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, verdict, error, tone):
+    d = summary.diagnosis
+    after = replace(d.after, fit={**d.after.fit, "held_out_rms": error})
+    findings = (object(),) if verdict == Verdict.ONE_EFFECT else ()
+    found = SimpleNamespace(
+        verdict=verdict, sentence="x", before=d.before, after=after, error_without=None, findings=findings, advice=()
+    )
+    first = first_screen.of_set(found)
+    assert first.tone == tone
+    assert first.tag != "The model is wrong" or tone == "bad"
+    assert first.advice == (f"Use the coefficients of this page{', which hold what was found' if findings else ''}.",)
+    assert any("is off without it" in words for _, words in first.costs) == bool(findings)
