@@ -50,8 +50,9 @@ def _fill_controls(app: Dash, shelf: RecordingCache) -> None:
         if not name or not kept:
             return no_update, no_update
         now = from_json(kept)
-        fitted = shelf.bench(now.recording).known(now.now)
-        return (no_update, no_update) if fitted is None else tables.edited(fitted, name)
+        bench = shelf.bench(now.recording)
+        # A fit that is there is not waited for, whatever the server does meanwhile.
+        return tables.edited(bench.known(now.now) or bench.fit(now.now), name)
 
 
 def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
