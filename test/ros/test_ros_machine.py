@@ -257,6 +257,7 @@ def test_a_launch_ends_when_a_node_has_failed(ros2: Ros2):
 def test_a_launch_of_a_replay_leaves_what_a_run_leaves(ros2: Ros2, bag: Path):
     out = ros2.folder / "out"
     given = [f"bag:={bag}", f"out:={out}", "imu:=dtg", "site:=daejeon"]
+    assert ros2("run sdimu_calibration sdimu", "--version").strip()
     ros2("launch sdimu_calibration replay_launch.py", *given, within_s=DEADLINE_S)
     assert left(out) >= RESULTS
 

@@ -20,9 +20,10 @@ def test_a_save_right_after_an_add_writes_the_new_model(tmp_path):
         _out=tmp_path,
         _take_model=lambda seconds=math.inf: done.append(("model", seconds)),
         _write_result=lambda: done.append(("result", 0)),
+        _diagnosing=SimpleNamespace(report=lambda: done.append(("report", 0))),
     )
     assert CalibrationNode._answer_save(node, Trigger.Request(), Trigger.Response()).success
-    assert done == [("model", math.inf), ("result", 0)]
+    assert done == [("model", math.inf), ("result", 0), ("report", 0)]
 
 
 def setting(*effects):

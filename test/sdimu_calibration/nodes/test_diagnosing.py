@@ -15,7 +15,7 @@ def test_the_death_of_the_worker_is_told_once(monkeypatch):
     monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.StopDiagnosis", lambda *_: stops)
     told = []
     node = SimpleNamespace(create_publisher=lambda *_: None)
-    diagnosing = Diagnosing(node, SimpleNamespace(), (), told.append)
+    diagnosing = Diagnosing(node, SimpleNamespace(report=None), (), told.append)
     diagnosing.tick(1)
     diagnosing.tick(2)
     assert told == ["the process has ended"]

@@ -27,8 +27,6 @@ def leave_report(folder: Path, test: PreparedTest, model: Model, name: str) -> N
 
     Parameters
     ----------
-    folder : Path
-    test : PreparedTest
     model : Model
         With what was added to it.
     name : str

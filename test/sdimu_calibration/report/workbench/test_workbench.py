@@ -126,7 +126,7 @@ class Page:
 def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tmp_path):
     page = Page(app)
     shown = page.shown()
-    assert HIDDEN in shown["verdict"]["children"]
+    assert "Certain: accelerometer second-order nonlinearity K2, x (" in shown["verdict"]["children"]
     bars = shown["ranking"]["figure"]["data"][0]["y"]
     assert bars[0] == HIDDEN
     chosen = page.post("candidate.value", "ranking.clickData", ranking_at_clickData={"points": [{"y": bars[0]}]})

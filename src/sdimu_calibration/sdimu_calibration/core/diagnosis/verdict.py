@@ -219,7 +219,7 @@ def error_falls(d: Diagnosis) -> str:
             f"{beyond(d.rungs[0].scatter)} -> {beyond(d.rungs[-1].scatter)}"
         )
     white = ", in white noise" if noise_learned(d.after) else ""
-    return f"error at stops held out, a third at a time{white}: {held_out(d.before):.3f} -> {held_out(d.after):.3f}"
+    return f"error at stops held out{white}: {held_out(d.before):.3f} -> {held_out(d.after):.3f}"
 
 
 def beyond(scatter: Sequence[float] | Floats) -> str:
