@@ -60,7 +60,7 @@ test: check
 # `other-blas` then leaves out of these.
 thorough: export OPENBLAS_CORETYPE = Haswell
 thorough: setup
-	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and ros and not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench"
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
 # What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -290,4 +291,5 @@ def test_a_domain_without_a_test_is_told_after_the_time_to_watch() -> None:
     finally:
         watching.kill()
     assert watching.returncode == 1
-    assert f"ROS domain {nobody}: nothing heard in 2 s" in err
+    # On a busy machine the two seconds take longer to pass.
+    assert re.search(rf"ROS domain {nobody}: nothing heard in \d+ s", err)

@@ -30,6 +30,8 @@ TOOLS = "SDIMU_ROS2"
 SYSTEM = ("numpy==1.26.4", "scipy==1.11.4", "PyYAML==6.0.1")
 """What rosdep installs on Ubuntu 24.04; numpy 1.26 has no wheel for Python 3.13 and later."""
 DEADLINE_S = 400.0
+QUESTION = "std_msgs/msg/String"
+"""Type of the table's question: `ros2 topic echo` then needs not wait until it has found the publisher."""
 PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "doc").glob("*.md")))
 
 
@@ -295,7 +297,9 @@ def test_a_table_moves_by_the_documented_commands_and_not_without(ros2: Ros2, ma
     with ros2.running(table), ros2.running("run sdimu_sim sdimu_node --ros-args", "-p", f"truth_file:={out}.yaml"):
         with ros2.running(begin, *given):
             wait(lambda: "/table_goals/question" in ros2("topic list"), "the table's driver")
-            assert "deg" in ros2("topic echo /table_goals/question --once --full-length", within_s=DEADLINE_S)
+            assert "deg" in ros2(
+                "topic echo /table_goals/question", QUESTION, "--once", "--full-length", within_s=DEADLINE_S
+            )
             assert "success=True" in ros2("service call /table_goals/confirm std_srvs/srv/SetBool", "{data: true}")
             assert "success=True" in ros2("service call /rate_table/hold std_srvs/srv/Trigger")
             assert "success=True" in ros2("service call /rate_table/resume std_srvs/srv/Trigger")
