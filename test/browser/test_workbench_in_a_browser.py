@@ -127,7 +127,7 @@ def test_what_is_hidden_is_found_added_and_taken_home(
     visit: Callable[[], Any], workbench: Workbench, tmp_path: Path
 ) -> None:
     page = visit()
-    assert text(page, "verdict").startswith("\N{HEAVY BALLOT X}")
+    assert text(page, "verdict").startswith("\N{WARNING SIGN}")
     before, grid = held_out(page), drawn(page, "heat", "z.map(r => Array.from(r))")
     assert drawn(page, "ranking", "y")[0] == HIDDEN
     threshold = page.evaluate("document.querySelector('#ranking .js-plotly-plot').layout.shapes[0].x0")
@@ -157,7 +157,7 @@ def test_what_is_hidden_is_found_added_and_taken_home(
     assert shown == pytest.approx(exported["fit"]["held_out_rms"], abs=0.002)
 
     page.locator("#undo").click()
-    page.locator("#verdict", has_text="\N{HEAVY BALLOT X}").wait_for()
+    page.locator("#verdict", has_text="\N{WARNING SIGN}").wait_for()
     settle(page)
     assert held_out(page) == before
     # What was tried can still be compared.
@@ -209,18 +209,18 @@ def test_a_reload_loses_nothing_and_another_session_sees_nothing_of_it(visit: Ca
     settle(one)
     own, shown = one.locator("#own").input_value(), (text(one, "verdict"), text(one, "numbers"))
     other = visit()
-    assert text(other, "verdict").startswith("\N{HEAVY BALLOT X}")
+    assert text(other, "verdict").startswith("\N{WARNING SIGN}")
     one.reload()
     settle(one)
     assert (text(one, "verdict"), text(one, "numbers")) == shown
     assert one.locator("#own").input_value() == own
     one.locator("#undo").click()
-    one.locator("#verdict", has_text="\N{HEAVY BALLOT X}").wait_for()
+    one.locator("#verdict", has_text="\N{WARNING SIGN}").wait_for()
     settle(one)
     add_first(other)
     other.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
     settle(other)
-    assert text(one, "verdict").startswith("\N{HEAVY BALLOT X}")
+    assert text(one, "verdict").startswith("\N{WARNING SIGN}")
 
 
 def test_a_click_on_a_cell_shows_that_stop_and_channel(visit: Callable[[], Any]) -> None:
@@ -345,7 +345,7 @@ def test_undo_redo_and_help_by_keyboard(visit: Callable[[], Any]) -> None:
     page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
     settle(page)
     page.keyboard.press("Control+z")
-    page.locator("#verdict", has_text="\N{HEAVY BALLOT X}").wait_for()
+    page.locator("#verdict", has_text="\N{WARNING SIGN}").wait_for()
     settle(page)
     page.keyboard.press("Control+y")
     page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
