@@ -33,7 +33,7 @@ pytestmark = pytest.mark.ros
 
 INTERVAL_NS = 10_000_000
 START_NS = 1_700_000_000 * 10**9
-PATIENCE_S = 60.0
+PATIENCE_S = 200.0
 
 
 def drawn(seed: int, *more: str, **data: float) -> Calibration:

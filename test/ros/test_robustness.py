@@ -15,12 +15,11 @@ from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.recover import recover
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import RATE_HZ, FitSession, imu_stamps, samples_of, write_plan
+from .conftest import DEADLINE_S, RATE_HZ, FitSession, imu_stamps, samples_of, write_plan
 
 pytestmark = pytest.mark.ros
 
 NODES = ("recorder", "calibration", "sdimu", "rate_table")
-LEASE_S = 3.0
 INTERVAL_NS = 10**9 // RATE_HZ
 
 
@@ -67,10 +66,8 @@ def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: FitSe
         reached_s = monitor.progress.table_s
     finally:
         monitor.close()
-    killed = time.monotonic()
+    # Whoever waited for the dead recorder would wait for ever: the others end, however busy the machine is.
     bench.wait_for_end()
-    # The rest of the data takes 6 s at this speed; the lease and the last calibration come on top.
-    assert time.monotonic() - killed < 10.0 + LEASE_S + 5.0
     assert read_result(bench.folder).data["samples"] == samples_of(60.0)
     with pytest.raises(DataError, match="recover"):
         read_recording(bench.folder / "bag")
@@ -130,7 +127,7 @@ def test_a_run_whose_calibration_dies_ends_with_one_line(tmp_path: Path) -> None
     others = parent.children(recursive=True)
     time.sleep(3.0)
     victim.kill()
-    _, err = process.communicate(timeout=30.0)
+    _, err = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 1
     assert len(err.splitlines()) == 1
     assert "calibration" in err

@@ -92,7 +92,7 @@ def test_replay_gives_the_same_result(whole_run: Run, tmp_path: Path) -> None:
 )
 def test_unusable_options_are_one_line_and_status_1(arguments: tuple[str, ...], word: str, tmp_path: Path) -> None:
     process = sdimu(*arguments, "--out", tmp_path / "out")
-    _, err = process.communicate(timeout=30.0)
+    _, err = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 1
     assert len(err.splitlines()) == 1
     assert word in err

@@ -1,7 +1,6 @@
 """The calibration node without its topics: what a request does to the model in use."""
 
 import math
-import time
 from types import SimpleNamespace
 
 import pytest
@@ -67,8 +66,6 @@ def test_whatever_is_added_live_the_node_goes_on_and_says_in_one_line_why_not(ef
 def test_a_huge_effect_file_is_refused_before_it_is_read(tmp_path):
     path = tmp_path / "huge.yaml"
     path.write_text("format: sdimu-effect/1\n" + "".join(f"k{i}: 1\n" for i in range(90_000)))
-    start = time.monotonic()
     answer, _ = setting(str(path))
     assert not answer.successful
     assert f"{path}: longer than" in answer.reason
-    assert time.monotonic() - start < 0.5
