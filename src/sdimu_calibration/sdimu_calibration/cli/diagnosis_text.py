@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.cli.next_commands import Asked
+    from sdimu_calibration.core.diagnosis.assumed import Assumed
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
     from sdimu_calibration.core.diagnosis.ladder import Rung
@@ -38,6 +39,8 @@ _WHOLE = 100.0
 """Number from which a size has no decimals: two digits of it would be written with an exponent."""
 _EACH = 4
 """Number of families of which the smallest size is told, of gyros and of accelerometers each."""
+_ASSUMED = 4
+"""Number of effects taken for granted that are named: the page has them for every coefficient."""
 POSSIBLE = 0.1
 """Probability (1) from which something that is not told is listed as possible: less is one of many."""
 
@@ -212,8 +215,23 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
     for group in summary.untestable:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")
+    if summary.assumed:
+        line(console, f"taken for granted by the coefficients: {taken_for_granted(summary.assumed)}")
     if summary.reached:
         line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
+
+
+def taken_for_granted(assumed: Sequence[Assumed]) -> str:
+    """Say what would move coefficients if it were there after all: of each effect the largest move."""
+    first: dict[str, Assumed] = {}
+    for one in assumed:
+        first.setdefault(one.family, one)
+    told = [
+        f"no {one.label} ({amount(one.size, one.display_unit)} {one.display_unit} of it, {one.coefficient} is off by "
+        f"{one.sigmas:.0f} sigma)"
+        for one in first.values()
+    ]
+    return "; ".join(told[:_ASSUMED])
 
 
 def smallest(reached: tuple[DetectableSize, ...]) -> str:

@@ -170,7 +170,7 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None
         unknown_section(diagnosis, draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),
-        sections.smallest(candidates),
+        sections.smallest(candidates, summary.assumed),
         in_use(more, draw),
         sections.residuals(diagnosis, residuals, more, draw),
     ]

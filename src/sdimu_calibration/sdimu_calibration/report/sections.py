@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from sdimu_calibration.core.advice import Kind
+from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.ladder import Rung
@@ -361,7 +362,7 @@ def separation(calibration: Calibration, draw: Draw) -> str:
 _SMALLEST = ("effect", "smallest that would be found", "unit", "usual size", "share of signature left", "testable here")
 
 
-def smallest(entries: Sequence[data.Scored]) -> str:
+def smallest(entries: Sequence[data.Scored], assumed: Sequence[Assumed] = ()) -> str:
     """Return the minimal detectable sizes: what this test could have seen, the worst axis of each effect."""
     worst: dict[str, data.Scored] = {}
     for entry in entries:
@@ -374,11 +375,37 @@ def smallest(entries: Sequence[data.Scored]) -> str:
         "What could have been seen",
         f"<p>Of {len(rows)} effects, {untestable} could not have been seen on every axis at their usual size.</p>",
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
+        _taken_for_granted(assumed),
         quiet(
             "Worst axis of each effect. Found with 80 % power at the threshold of a whole scan; usual: one sigma of "
             "this grade of IMU."
         ),
     )
+
+
+_ASSUMED = (
+    "coefficient",
+    "takes for granted that there is no",
+    "size it may have",
+    "unit",
+    "the coefficient is off then",
+)
+
+
+def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
+    """Return for each coefficient the effect that would move it most, were it there; nothing where none matters."""
+    if not assumed:
+        return ""
+    rows = [
+        [a.coefficient, a.label, f"{from_si(a.size, a.display_unit):.3g}", a.display_unit, f"{a.sigmas:.1f} sigma"]
+        for a in assumed
+    ]
+    told = (
+        f"{len(rows)} coefficients take for granted that an effect is absent which this test shows weakly or "
+        "not at all: their sigmas hold without it."
+    )
+    table = f"<details><summary>What each takes for granted</summary>{grid(_ASSUMED, rows, {0, 1, 3})}</details>"
+    return f"<p>{told}</p>{table}"
 
 
 def _seen(entry: data.Scored) -> list[str]:

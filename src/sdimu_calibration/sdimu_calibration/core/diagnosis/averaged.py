@@ -25,7 +25,9 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     averages = Averages(found.board, base.dwell_means)
     places = {column: k for k, column in enumerate(found.board.columns(found.told.members))}
     told = tuple(sorted(found.told.members[places[int(c)]] for c in done.found.chosen))
-    one, all_ = averages.of_model(told, NoiseModel(done.found.noise)), averages.of(found)
+    # The fit states its sigmas by its noise model, whatever that leaves.
+    as_stated = Averages(found.board.as_stated, base.dwell_means)
+    one, all_ = as_stated.of_model(told, NoiseModel(done.found.noise)), averages.of(found)
     q, count = len(one.mean), len(done.found.chosen)
     added = done.fit.added_columns(count)
     own = np.setdiff1d(np.arange(q + count), added)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.diagnosis.advice import Untestable, advice, handheld_advice, untestable_reasons
+from sdimu_calibration.core.diagnosis.assumed import Assumed, assumed_absent
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
@@ -27,6 +28,8 @@ class DiagnosisSummary:
         Turns and stops of the table; None for a handheld run.
     untestable : tuple of Untestable
         What could not have been seen, by reason.
+    assumed : tuple of Assumed
+        What would move a coefficient most, if it were there after all.
     """
 
     diagnosis: Diagnosis
@@ -35,6 +38,7 @@ class DiagnosisSummary:
     plan: PlanSeen | None
     untestable: tuple[Untestable, ...]
     advice: tuple[Advice, ...]
+    assumed: tuple[Assumed, ...] = ()
 
     @property
     def candidates(self) -> tuple[Found, ...]:
@@ -49,7 +53,8 @@ def summarise(d: Diagnosis) -> DiagnosisSummary:
     found, reached = found_effects(d), reach(d)
     if not isinstance(d.evidence, NavigationEvidence):
         hidden = tuple(r.label for r in reached if not r.testable)
-        reasons = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
-        return DiagnosisSummary(d, found, reached, None, reasons, handheld_advice(d, found))
+        unseen = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
+        return DiagnosisSummary(d, found, reached, None, unseen, handheld_advice(d, found), assumed_absent(d))
     plan = plan_seen(d.evidence)
-    return DiagnosisSummary(d, found, reached, plan, untestable_reasons(reached, plan), advice(d, found, reached, plan))
+    reasons, told = untestable_reasons(reached, plan), advice(d, found, reached, plan)
+    return DiagnosisSummary(d, found, reached, plan, reasons, told, assumed_absent(d))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic
 
@@ -76,8 +77,44 @@ class Board(Generic[E]):
     ) -> None:
         self.evidence, self.allowed, self.finer, self.wander = evidence, allowed, finer, wander
         self.joint = None if wander is None else Joint.of(evidence, wander, earlier)
+        self.excess = 1.0
+        self.as_stated = self
         self._data: dict[NoiseModel, tuple[float, Data]] = {}
         self._in_noise: dict[NoiseModel, InNoise] = {}
+
+    def in_excess(self, excess: float) -> Board[E]:
+        """Return the board with all noise larger than the models of it say.
+
+        Where the best model in the best noise leaves residuals of that variance, no model of noise is right, and
+        whatever it decides is decided by too much: all covariances grow, all log likelihoods fall by the same factor.
+        Source: P. McCullagh, J. Nelder, "Generalized linear models" (1989), section 4.5 (overdispersion).
+
+        Parameters
+        ----------
+        excess : float
+            Variance over that of the noise models (1).
+        """
+        if excess == self.excess:
+            return self
+        out = copy(self)
+        out.excess, out._data, out._in_noise = excess, {}, {}
+        return out
+
+    def excess_of(self, members: Members, noise: NoiseModel) -> float:
+        """Variance of what a model leaves, over that of its noise (1); none below 1.
+
+        ``(e' S^-1 e - d' A^-1 d) / (N - k)``: S is the covariance of all noise, A and d the information on the k
+        parameters of the model.
+        """
+        evidence, one = self.evidence, self.as_stated.in_noise(noise)
+        at = np.array([*range(len(evidence.weight)), *(len(evidence.weight) + k for k, _ in members)], dtype=np.int64)
+        _, weight = self.parameters(members)
+        A, d = one.J[np.ix_(at, at)] + np.diag(weight), one.d[at]
+        # The modes take y' M^-1 y of the square sum: u = M^-1 y, and `inverse` is M^-1.
+        modes = float(one.u @ np.linalg.solve(one.inverse, one.u)) if one.u.size else 0.0
+        prior = float(evidence.weight @ evidence.shift**2)
+        left = float(evidence.e @ evidence.e) - modes + prior - float(d @ solved(A, d[:, None])[:, 0])
+        return max(left / max(len(evidence.e) - len(members), 1), 1.0)
 
     @cached_property
     def use(self) -> Ints:
@@ -129,8 +166,17 @@ class Board(Generic[E]):
     def in_noise(self, noise: NoiseModel) -> InNoise:
         """Information on coefficients and candidates in a noise."""
         if noise not in self._in_noise:
-            self._in_noise[noise] = self._worked_out(noise)
+            as_stated = self.as_stated is self
+            self._in_noise[noise] = self._worked_out(noise) if as_stated else self._in_excess(noise)
         return self._in_noise[noise]
+
+    def _in_excess(self, noise: NoiseModel) -> InNoise:
+        one, evidence = self.as_stated.in_noise(noise), self.evidence
+        # What is known of the coefficients before the data does not change.
+        pull = np.zeros(len(one.d))
+        pull[: len(evidence.weight)] = evidence.weight * evidence.shift
+        d = (one.d - pull) / self.excess + pull
+        return replace(one, J=one.J / self.excess, d=d, inverse=one.inverse * self.excess)
 
     def _worked_out(self, noise: NoiseModel) -> InNoise:
         keep, full = self.keep, self.evidence.information
@@ -152,7 +198,7 @@ class Board(Generic[E]):
             offset = noise.log_prior
             if noise.terms and self.joint is not None and self.wander is not None:
                 nothing = self.joint.on_wander(evidence.model, evidence.weight)
-                offset += likelihood(nothing, self.wander.cut, noise.terms) - nothing.fitted
+                offset += (likelihood(nothing, self.wander.cut, noise.terms) - nothing.fitted) / self.excess
             given = Information(one.J, one.d).given(np.arange(p), evidence.weight)
             scaled = np.ascontiguousarray(given.J[p:, p:] * np.outer(self.size, self.size))
             self._data[noise] = offset, Data(scaled, given.d[p:] * self.size, self.prior)

@@ -263,10 +263,12 @@ def posterior(
         sharpened += 1
     if sharpened:
         noises, members, beside = _climbed(board, [members], tried, settled=True)
+    board = board.in_excess(board.excess_of(members, noises[0]))
     data = [board.data(noise) for noise in noises]
     starts = [members, *crossed(data[0][1], members)]
     found = window([d for _, d in data], [offset for offset, _ in data], starts)
     models = _weighed(found, noises)
+    beside = [((score - noise.log_prior) / board.excess + noise.log_prior, noise) for score, noise in beside]
     return Posterior(board, models, _noises(models, beside))
 
 

@@ -88,6 +88,7 @@ class DiagnosisFile(ResultModel):
     plan: Row = None
     not_testable: Rows = ()
     smallest_detectable: Rows = ()
+    assumed_absent: Rows = ()
     bootstrap: Row = None
 
 
@@ -152,6 +153,9 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
         plan=_plan(summary.plan),
         not_testable=[reach_of(r) | {"reason": _reason(summary, r)} for r in summary.reached if not r.testable],
         smallest_detectable=[reach_of(r) for r in summary.reached if r.testable],
+        assumed_absent=[
+            entry(a, "coefficient label effect=family size unit display_unit sigmas") for a in summary.assumed
+        ],
         **more,
     )
 

@@ -1,0 +1,35 @@
+"""What a coefficient takes for granted moves it by what is told, when it is there after all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis.assumed import assumed_absent
+from sdimu_calibration.core.units import from_si
+
+
+@pytest.fixture(scope="module")
+def assumed(bench):
+    return {one.coefficient: one for one in assumed_absent(bench.diagnosis(effects=()))}
+
+
+# One rate of all turns, and every stop at +-1 g or level: of two orders the plan shows the sum.
+@pytest.mark.parametrize("name", ["gyro_scale_x", "accel_scale_z"])
+def test_a_coefficient_is_off_by_what_is_told_where_the_effect_is_there(bench, assumed, name):
+    one = assumed[name]
+    size = from_si(one.size, one.display_unit)
+    without = bench.fit(effects=())
+    with_it = bench.fit(effects=(f"{one.label}={size!r} {one.display_unit}",))
+    k = without.sensors.names.index(name)
+    sigma = np.sqrt(np.diag(without.estimate_covariance))[k]
+    moved = abs(with_it.estimate[k] - without.estimate[k]) / sigma
+    assert one.sigmas > 3.0
+    # The same seed: the noise is the same in both.
+    assert moved == pytest.approx(one.sigmas, rel=0.1)
+
+
+def test_what_the_test_shows_well_is_not_taken_for_granted(assumed):
+    # Misalignments of gyros show in turns of 90 deg, and nothing of the catalogue looks like them.
+    assert not any(name.startswith("gyro_misalignment") for name in assumed)
+    assert all(one.sigmas > 3.0 for one in assumed.values())
