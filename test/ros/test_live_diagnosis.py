@@ -26,6 +26,7 @@ from std_msgs.msg import Float64MultiArray
 import sdimu_calibration
 from sdimu_calibration.core.data.arrival import RawStatus, RawTest, until
 from sdimu_calibration.core.diagnosis import rounds
+from sdimu_calibration.core.diagnosis.grades import named
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.core.diagnosis.search import search
 from sdimu_calibration.core.recording import DataError
@@ -163,7 +164,7 @@ def test_shell_notebook_workbench_and_the_live_end_tell_the_same_probabilities(w
 
 def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
     assert whole.verdict in {"one effect", "class of effects"}
-    assert EFFECT in whole.sentence
+    assert named(EFFECT) in whole.sentence
     assert EFFECT in {r.label for r in whole.standing}
     added = Diagnoser(job).answer(WorkerRequest(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"

@@ -39,7 +39,8 @@ def learned(diagnosis: Diagnosis) -> Diagnosis:
     """The diagnosis as if it had found noise with a memory and no effect."""
     after = in_noise(diagnosis.after)
     found = replace(diagnosis.found, noise=(TERM,), steps=(), chosen=diagnosis.found.chosen[:0])
-    return replace(diagnosis, found=found, before=after, after=after, verdict="noise model wrong", adequate=False)
+    told = {"verdict": "noise model wrong", "adequate": False, "found_effects": ()}
+    return replace(diagnosis, found=found, before=after, after=after, **told)
 
 
 def no_figure(_: object) -> str:

@@ -29,7 +29,6 @@ from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import rows
-from sdimu_calibration.storage.files.verdict_words import headline
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +58,7 @@ def test_the_verdict_stands_first(text, diagnosis):
     body = text.partition("<body>")[2]
     (found,) = diagnosis.chosen
     assert body.index(found.effect.title) < body.index("<h2>")
-    assert prose(headline(summarise(diagnosis))) in body
+    assert prose(diagnosis.sentence) in body
 
 
 def test_the_page_brings_its_library_once_and_asks_no_network(text):
@@ -164,7 +163,7 @@ def test_no_size_of_a_candidate_is_written_over_the_line_of_the_noise(diagnosis,
 def test_a_diagnosis_of_a_right_model_makes_a_page_too(diagnosis):
     found = diagnosis.found
     empty = type(found)((), found.chosen[:0], found.first, found.threshold, diagnosis.evidence)
-    quiet = replace(diagnosis, found=empty, adequate=True, verdict="consistent")
+    quiet = replace(diagnosis, found=empty, found_effects=(), adequate=True, verdict="consistent")
     text = page(diagnosis.before, Contents("x", summary=summarise(quiet)))
     assert "No candidate stands out" in text
     assert 'class="verdict good"' in text

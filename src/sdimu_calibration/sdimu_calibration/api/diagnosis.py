@@ -28,7 +28,6 @@ from sdimu_calibration.report.unknown_section import followed, unknown_of
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
-from sdimu_calibration.storage.files.verdict_words import headline
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
 
@@ -58,7 +57,7 @@ class FitDiagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence: what is certain, what is likely, what is open."""
-        return headline(self.summary)
+        return self.core.sentence
 
     @property
     def adequate(self) -> bool:

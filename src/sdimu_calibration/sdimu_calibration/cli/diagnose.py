@@ -62,7 +62,6 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.files.effect_file import find_effects
     from sdimu_calibration.storage.files.model_choice import HANDHELD
-    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.trace import traced
 
     console, asked = plain(stderr=request.as_json), request.asked_estimator
@@ -102,7 +101,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", request.as_json)
-    leave(found.after, (found.verdict, headline(summary)))
+    leave(found.after, (found.verdict, summary.diagnosis.sentence))
 
 
 @dataclass(frozen=True)

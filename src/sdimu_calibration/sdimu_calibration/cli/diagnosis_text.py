@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.diagnosis.verdict import beyond, error_falls
 from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -15,7 +16,6 @@ from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
 from sdimu_calibration.report.cost import in_use, wrong_without
-from sdimu_calibration.storage.files.verdict_words import NAMED, headline
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,7 +48,7 @@ POSSIBLE = 0.1
 def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, more: ReportExtras | None = None) -> None:
     """Print everything that a diagnosis has to say; its advice as commands for what was asked."""
     d = summary.diagnosis
-    said = headline(summary)
+    said = summary.diagnosis.sentence
     line(console, said)
     for text in cost_lines(summary, more):
         line(console, text)

@@ -329,7 +329,6 @@ def _diagnosed(console: Console, asked: After) -> Standing:
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.model_choice import named_model
-    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.opening import open_test
 
     if len(asked.paths) > 1:
@@ -340,7 +339,7 @@ def _diagnosed(console: Console, asked: After) -> Standing:
     test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
     with bar(console) as progress:
         one = summarise(climb(solve(test, named_model(asked.model, ()), progress=progress), progress=progress))
-    say(console, f"{one.diagnosis.verdict}: {headline(one)}")
+    say(console, f"{one.diagnosis.verdict}: {one.diagnosis.sentence}")
     return standing(one.diagnosis, one.found)
 
 

@@ -11,6 +11,7 @@ from html import escape
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
@@ -28,7 +29,6 @@ from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.ladder_strip import ladder_strip
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.report_extras import ReportExtras
-from sdimu_calibration.storage.files.verdict_words import headline, name_of
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}
@@ -87,7 +87,7 @@ def of_diagnosis(
         advice.append(_unseen(summary))
     title = _COSTS if summary.found else _PREDICTS
     told = tuple(advice_html(one, spell) for one in advice)
-    said = headline(summary)
+    said = summary.diagnosis.sentence
     unsaid = [text for text in d.noise if text not in said]
     noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
     remarks = (*_remarks(d.after), *noise)
@@ -112,7 +112,7 @@ def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
 
 def _head(summary: DiagnosisSummary) -> str:
     """Verdict as HTML, the equation of each effect that was found under its name."""
-    html = prose(headline(summary)).replace("(-", "(\N{MINUS SIGN}")
+    html = prose(summary.diagnosis.sentence).replace("(-", "(\N{MINUS SIGN}")
     for one in summary.candidates:
         words = name_of(one)
         shown = tip(words, one.candidate.effect, [one.candidate.label])

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from sdimu_calibration.core.diagnosis.grades import size_of
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -29,7 +30,6 @@ from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.unknown_section import unknown_section
 from sdimu_calibration.report.use_section import in_use
-from sdimu_calibration.storage.files.verdict_words import size_of
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
 

@@ -24,7 +24,6 @@ from sdimu_calibration.report.effect_words import effect_of_key, families, famil
 from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
-from sdimu_calibration.storage.files.verdict_words import headline
 
 _UNUSUAL = 0.05
 """Probability (1) below which a right model is unusual: one in twenty."""
@@ -160,7 +159,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
     )
     return section(
         "Effects: what is missing, how large",
-        sentence(headline(summary)),
+        sentence(summary.diagnosis.sentence),
         found_table(summary),
         *fits,
         folded(

@@ -300,7 +300,6 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.storage.files.effect_file import extended_model
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
-    from sdimu_calibration.storage.files.verdict_words import headline
     from sdimu_calibration.storage.opening import open_test
     from sdimu_calibration.storage.trace import traced
 
@@ -329,7 +328,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         )
     shown = rich_table(rows(result, truth, read_reference()), f"body frame: {result.body_frame}")
     console.print(shown, soft_wrap=True)
-    for text in (headline(summary), *cost_lines(summary, more)):
+    for text in (summary.diagnosis.sentence, *cost_lines(summary, more)):
         console.print(text, soft_wrap=True, highlight=False)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)

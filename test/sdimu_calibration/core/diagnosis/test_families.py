@@ -16,7 +16,9 @@ def test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing
 def test_a_triad_that_turns_is_told_as_one_effect_on_two_axes(bench):
     found = bench.diagnosis(7, TURNED)
     assert {c.label for c in found.chosen} == {"accel_triad_ramp_x", "accel_triad_ramp_y"}
-    assert found.sentence.startswith("One effect is missing on 2 axes (the least sure of them > 99 %): turn of the ")
+    words, sizes = "turn of the accelerometer triad", found.sentence.count(" arcsec/h)")
+    assert found.sentence.startswith("Certain: ")
+    assert found.sentence.count(words) == sizes == 2
 
 
 def test_a_delay_of_a_gyro_and_its_sensitivity_to_angular_acceleration_are_one_find(bench):

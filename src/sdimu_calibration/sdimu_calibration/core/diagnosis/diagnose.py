@@ -15,6 +15,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.alarms import Alarm, alarms
 from sdimu_calibration.core.diagnosis.averaged import over_all_models
+from sdimu_calibration.core.diagnosis.found import Found, found_effects
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
@@ -43,8 +44,6 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Option
 
-_OPEN = 0.05
-"""Probability (1) from which something that looks the same is named in the sentence: one in twenty."""
 _TO_AND_FRO = (
     "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
     "these one is named, and another may be right"
@@ -85,6 +84,8 @@ class Diagnosis:
         What speaks against a model that has all of this.
     rungs : tuple of Rung
         The fit as given and with each found effect added; empty where it was not asked for.
+    found_effects : tuple of Found
+        What was found, one at a time; when the verdict is ``unexplained`` what was tried.
     """
 
     verdict: Verdict
@@ -106,6 +107,7 @@ class Diagnosis:
     own: bool
     alarms: frozenset[Alarm]
     rungs: tuple[Rung, ...] = ()
+    found_effects: tuple[Found, ...] = ()
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -135,11 +137,6 @@ class Diagnosis:
             return float("nan"), ()
         place = window.place_of(column)
         return window.of_class(place), may_be(window, place)
-
-    def is_open(self, candidate: Candidate) -> bool:
-        """Whether something that looks the same may well be there in the place of a chosen candidate."""
-        _, shares = self.may_be(int(self.found.chosen[self.chosen.index(candidate)]))
-        return any(s.probability > _OPEN for s in shares if s.name != candidate.coefficient)
 
     @property
     def navigation(self) -> NavigationEvidence:
@@ -250,7 +247,8 @@ def climb(
         raised,
         rungs,
     )
-    return replace(unspoken, sentence=sentence(unspoken))
+    found = found_effects(unspoken)
+    return replace(unspoken, sentence=sentence(unspoken, found), found_effects=found)
 
 
 def _findings(base: Fit, widened: Fit, done: Round) -> tuple[Finding, ...]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.problem import Problem
@@ -18,6 +18,9 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
+
+if TYPE_CHECKING:
+    from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 
 DECIDED = 0.95
 """Probability of a family (1) from which a member of it is advised to be kept: one in twenty is wrong then."""

@@ -8,7 +8,7 @@ from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.diagnosis.advice import Untestable, advice, handheld_advice, untestable_reasons
 from sdimu_calibration.core.diagnosis.assumed import Assumed, assumed_absent
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, found_effects, reach
+from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, reach
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, plan_seen
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.verdict import Verdict
@@ -50,7 +50,7 @@ class DiagnosisSummary:
 
 def summarise(d: Diagnosis) -> DiagnosisSummary:
     """Work out what a diagnosis has to say."""
-    found, reached = found_effects(d), reach(d)
+    found, reached = d.found_effects, reach(d)
     if not isinstance(d.evidence, NavigationEvidence):
         hidden = tuple(r.label for r in reached if not r.testable)
         unseen = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()

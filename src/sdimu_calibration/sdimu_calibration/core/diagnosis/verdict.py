@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.grades import LISTED, graded, in_grades, listed
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
@@ -25,18 +26,13 @@ from sdimu_calibration.core.verdict import Verdict
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+    from sdimu_calibration.core.diagnosis.found import Found
 
 _COLOURED = 1.2
 """Ratio of the scatter over ten seconds to that of white noise from which noise is coloured: five sigma of fifty
 minutes."""
 _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
-_LARGEST = 3
-"""Number of effects that a sentence names where there are more than it lists: the table has the rest."""
-CERTAIN = 0.99
-"""Probability (1) from which an effect is called certain: one in a hundred is wrong then."""
-_LISTED = 4
-"""Number of effects, or of those that look the same as one, that a sentence lists: more do not fit into one."""
 
 
 @dataclass(frozen=True)
@@ -78,9 +74,15 @@ def verdict(facts: Facts) -> Verdict:
     return Verdict.CONSISTENT
 
 
-def sentence(d: Diagnosis) -> str:
-    """Put the verdict into one sentence."""
-    names = _named(d)
+def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
+    """Put the verdict into one sentence: what was found by how sure it is.
+
+    Parameters
+    ----------
+    found : sequence of Found
+        What was chosen, one at a time.
+    """
+    names = listed(c.label for c in d.chosen)
     if d.verdict == Verdict.CONSISTENT:
         return _consistent(d)
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
@@ -91,82 +93,8 @@ def sentence(d: Diagnosis) -> str:
         return f"The data have a fault: {'; '.join(faults)}."
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
-    rest = error_falls(d)
-    sure = _sure(d)
-    if d.verdict == Verdict.OWN_EQUATION:
-        return f"Something is missing that is not in the catalogue{sure}; it follows {names}; {rest}."
-    if d.verdict == Verdict.CLASS_OF_EFFECTS:
-        return f"One effect is missing{sure}: {names}, or what looks the same here ({_others(d)}); {rest}."
-    if len(d.chosen) > 1 and len(_families(d)) == 1:
-        return f"One effect is missing on {len(d.chosen)} axes{sure}: {names}; {rest}."
-    if d.verdict == Verdict.ONE_EFFECT:
-        return f"One effect is missing{sure}: {names}; {rest}."
-    return f"Several effects are missing{_graded(d) or f'{sure}: {names}'}; {rest}."
-
-
-def _sure(d: Diagnosis) -> str:
-    """Say how probable what was found is; of several the least."""
-    told = [d.may_be(int(column))[0] for column in d.found.chosen]
-    if not told or not np.isfinite(min(told)):
-        return ""
-    return f" ({in_percent(min(told))})" if len(told) == 1 else f" (the least sure of them {in_percent(min(told))})"
-
-
-def _graded(d: Diagnosis) -> str:
-    """Name what is certain, and what is likely or open with its probability; empty where all is certain, or unknown."""
-    p = {c.label: d.may_be(int(column))[0] for c, column in zip(d.chosen, d.found.chosen, strict=True)}
-    families = _families(d)
-    every = [c for group in families for c in group]
-    others = {c.label: _others(d, list(d.chosen).index(c)) if d.is_open(c) else "" for c in every}
-    firm = [[c for c in group if p[c.label] >= CERTAIN and not others[c.label]] for group in families]
-    firm = [group for group in firm if group]
-    if not all(np.isfinite(value) for value in p.values()) or sum(map(len, firm)) == len(every):
-        return ""
-    together = {label: "" if share >= CERTAIN else f"together {in_percent(share)}, " for label, share in p.items()}
-    open_ = [
-        f"{c.label} or what looks the same ({together[c.label]}{others[c.label]})" for c in every if others[c.label]
-    ]
-    likely = [f"{c.label} ({in_percent(p[c.label])})" for c in every if p[c.label] < CERTAIN and not others[c.label]]
-    told = [f"certain {_in_words(firm)}"] if firm else []
-    told += [f"likely {' and '.join(likely[:_LISTED])}"] if likely else []
-    told += [f"open {' and '.join(open_[:_LISTED])}"] if open_ else []
-    return f": {', '.join(told)}"
-
-
-def _others(d: Diagnosis, place: int = 0) -> str:
-    """Name what looks like an effect that was found, each with its probability."""
-    own = d.chosen[place].parameter.name
-    _, shares = d.may_be(int(d.found.chosen[place]))
-    told = [f"{share.name} {in_percent(share.probability)}" for share in shares if share.name != own]
-    return ", ".join((told or (list(d.alike) if place == 0 else []))[:_LISTED])
-
-
-def _families(d: Diagnosis) -> list[list[Candidate]]:
-    """Group what was found by effect, time constants and the like included; the largest score first."""
-    score = {step.label: abs(step.z) for step in d.found.steps}
-    groups: dict[tuple[str, ...], list[Candidate]] = {}
-    for candidate in sorted(d.chosen, key=lambda c: -score.get(c.label, 0.0)):
-        own = candidate.family == "own"
-        key = (candidate.label,) if own else (candidate.family, *candidate.effect.options.values())
-        groups.setdefault(key, []).append(candidate)
-    return list(groups.values())
-
-
-def _named(d: Diagnosis) -> str:
-    """Name what was found by families; of many the ones with the largest scores, and how many more."""
-    return _in_words(_families(d))
-
-
-def _in_words(families: Sequence[Sequence[Candidate]]) -> str:
-    """Name families of effects; of many the first ones, and how many more."""
-    words = [
-        group[0].label if len(group) == 1 else f"{group[0].effect.title} ({', '.join(c.label for c in group)})"
-        for group in families
-    ]
-    if len(words) <= _LISTED:
-        return " and ".join(words)
-    more = sum(len(group) for group in families[_LARGEST:])
-    return f"{', '.join(words[:_LARGEST])} and {more} more"
+    told = in_grades(graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities))
+    return f"No effect of the catalogue fits, an equation does. {told}" if d.own else told
 
 
 def _consistent(d: Diagnosis) -> str:
@@ -177,7 +105,7 @@ def _consistent(d: Diagnosis) -> str:
     told = d.probabilities
     if told is not None and told.nothing < PROBABLE:
         likely = ", ".join(
-            f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:_LISTED] if f.members
+            f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:LISTED] if f.members
         )
         return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
     nothing = "" if told is None else f" (nothing is missing: {in_percent(told.nothing)})"

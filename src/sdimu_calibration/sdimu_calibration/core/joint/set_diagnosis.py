@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, size
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
@@ -25,11 +26,9 @@ from sdimu_calibration.core.joint.set_standing import next_recording
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
-from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Work
 
@@ -245,25 +244,17 @@ def _found(
         what = "The recordings share something" if shared else "Something differs between the recordings"
         return f"{what} that no effect of the catalogue explains.{most}{_odd(after)}"
     falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
-    if word == Verdict.CLASS_OF_EFFECTS:
-        others = ", ".join(findings[0].alike[:_LISTED])
-        same = f"or what looks the same in these recordings ({others})"
-        return f"One effect is missing{_sure(findings)}: {names}, {same}; {falls}."
-    one = "One effect is" if word == Verdict.ONE_EFFECT else "Several effects are"
-    return f"{one} missing{_sure(findings)}: {names}; {falls}."
+    return f"{in_grades(list(map(_graded, findings)))} {falls[0].upper()}{falls[1:]}."
 
 
-def _sure(findings: Sequence[SetFinding]) -> str:
-    """Say how probable the effects of all recordings are; of several the least."""
-    told = [f.probability for f in findings if np.isfinite(f.probability)]
-    if not told:
-        return ""
-    return f" ({in_percent(told[0])})" if len(told) == 1 else f" (the least sure of them {in_percent(min(told))})"
+def _graded(f: SetFinding) -> Graded:
+    same = f", or what looks the same in these recordings ({', '.join(f.alike[:_LISTED])})" if f.alike else ""
+    return Graded(f"{_named(f)}{same}", f.label, "", f.probability)
 
 
 def _named(f: SetFinding) -> str:
-    size = f"{from_si(f.value, f.display_unit):.3g} +- {from_si(f.sigma, f.display_unit):.2g} {f.display_unit}"
-    return f"{f.label} ({size})" + (f" in {f.recording} alone" if f.recording else "")
+    where = f" in {f.recording} alone" if f.recording else ""
+    return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
 
 
 def _taken_back(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:

@@ -41,7 +41,6 @@ from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.files.verdict_words import headline
 
 Tell = Callable[[str, float], None]
 _MOST_KEPT = 200
@@ -176,7 +175,7 @@ class FitSession:
                     tuple(data.scored(scores)),
                     scores.found.threshold,
                     told.adequate,
-                    headline(summary),
+                    summary.diagnosis.sentence,
                     scores.free_inputs_after,
                     scores.fit.held_out_rms(),
                     told.probabilities,

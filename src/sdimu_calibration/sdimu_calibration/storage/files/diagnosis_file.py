@@ -32,7 +32,6 @@ from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, Said, read_model
 from sdimu_calibration.storage.files.standing_file import KnownEntry
-from sdimu_calibration.storage.files.verdict_words import headline
 
 if TYPE_CHECKING:
     # A diagnosis of one recording does not load what joins several.
@@ -125,7 +124,7 @@ def _file(summary: DiagnosisSummary, **more: Any) -> DiagnosisFile:
         adequate=d.adequate,
         p_value=d.p_value,
         verdict=d.verdict,
-        sentence=headline(summary),
+        sentence=summary.diagnosis.sentence,
         where=[entry(w, "channel stop normalised_mean") for w in d.consistency.where],
         probabilities=odds(d.probabilities),
         candidates=[candidate(f, d.own) for f in summary.candidates],

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import first_screen
-from sdimu_calibration.storage.files.verdict_words import _grade, headline, named, size_of
 
 
 @pytest.fixture(scope="module")
@@ -28,36 +28,39 @@ def with_shares(summary, probability, *shares):
     return replace(summary, found=(told,))
 
 
+def said(summary):
+    return in_grades(graded(summary.candidates, summary.diagnosis.probabilities))
+
+
 def own(summary):
     return summary.found[0].candidate.coefficient
 
 
 def test_what_is_certain_is_told_with_its_size(summary):
-    told = headline(with_shares(summary, 0.999, (own(summary), 0.999)))
+    told = said(with_shares(summary, 0.999, (own(summary), 0.999)))
     (one,) = summary.found
     assert told == f"Certain: accelerometer second-order nonlinearity K2, x ({size_of(one)})."
 
 
 def test_a_class_that_is_certain_says_which_member_is_open_each_with_its_probability(summary):
-    told = headline(with_shares(summary, 0.995, (own(summary), 0.82), ("accel_cubic_x", 0.18)))
+    told = said(with_shares(summary, 0.995, (own(summary), 0.82), ("accel_cubic_x", 0.18)))
     assert told.startswith("Certain, but open which: accelerometer second-order nonlinearity K2, x (")
     assert told.endswith(f") 82 % or {named('accel_cubic_x')} 18 %.")
 
 
 def test_what_is_likely_says_how_likely(summary):
-    told = headline(with_shares(summary, 0.9, (own(summary), 0.9)))
+    told = said(with_shares(summary, 0.9, (own(summary), 0.9)))
     assert told.startswith("Likely (90 %): ")
     assert "ertain" not in told
 
 
 def test_what_is_not_probable_enough_to_be_named_leaves_nothing_open(summary):
-    told = headline(with_shares(summary, 0.999, (own(summary), 0.97), ("accel_cubic_x", 0.03)))
+    told = said(with_shares(summary, 0.999, (own(summary), 0.97), ("accel_cubic_x", 0.03)))
     assert told.startswith("Certain: ")
 
 
 def test_the_sentence_has_no_error_of_another_place(summary):
-    assert "held out" in summary.diagnosis.sentence
-    assert "held out" not in headline(summary)
+    assert "held out" not in summary.diagnosis.sentence
 
 
 @pytest.mark.parametrize(
@@ -95,9 +98,9 @@ def test_a_family_surer_than_the_class_is_told_with_its_members_each_once_by_one
     told = Probabilities(0.0, (FamilyShare(family, sensor, 0.97, tuple(members)),), ())
     shares = (Share(own(summary), 0.5), Share("accel_scale_x", 0.28))
     found = replace(one, probability=0.6, of_family=0.97, may_be=shares)
-    graded_ = _grade(found, told)
-    assert graded_.probability == 0.97
-    assert [(s.name, s.probability) for s in graded_.may_be] == [
+    (one,) = graded([found], told)
+    assert one.probability == 0.97
+    assert [(s.name, s.probability) for s in one.may_be] == [
         (own(summary), 0.5),
         ("accel_scale_x", 0.28),
         ("accel_cubic_x", 0.1),
