@@ -115,6 +115,8 @@ LONG = {
         "test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause",
     ),
     "test/sdimu_calibration/core/estimation/test_every_estimator.py": (
+        "test_a_fit_answers_every_question[mems_industrial batch]",
+        "test_a_result_is_written_read_compensated_and_exported[mems_industrial batch]",
         "test_a_result_is_written_read_compensated_and_exported[mems_industrial second-order]",
         "test_every_caller_gives_the_same_digits[fog_tactical]",
         "test_every_caller_gives_the_same_digits[mems_consumer]",
@@ -196,6 +198,7 @@ LONG = {
         "test_the_prediction_is_the_covariance_of_a_test_in_that_noise[rlg_navigation]",
     ),
     "test/sdimu_calibration/core/second_order/test_second_order.py": (
+        "test_the_filter_agrees_with_the_batch",
         "test_gyros_that_lose_the_attitude_over_the_test_take_the_same_path",
         "test_what_speaks_against_a_result_is_in_it",
     ),
