@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.report import evidence_figures
+from sdimu_calibration.report.data import NOTABLE
 from sdimu_calibration.report.design.palette import DIVERGING, SERIES
 from sdimu_calibration.report.drawing import MUTED, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.groups import title
@@ -24,17 +25,20 @@ _EMPTY = 110
 """Height of a figure that has nothing to show yet (px)."""
 _CELL = 10
 """Size of the numbers in cells (px)."""
-_MOST_NUMBERED = 22
-"""Number of stops up to which numbers stand beside each other in a column of the page."""
+_MOST_NUMBERED, _MOST_WHOLE = 12, 26
+"""Number of stops up to which numbers with a digit, and whole numbers, stand beside each other in a column."""
 _DIGITS = 4
 """Digits of what is drawn: finer than a screen, and short on the way to the page."""
 _FULL = 3.0
-"""Powers of two of the NIS at which the colour is full: eight times too large or too small."""
+"""Powers of two of the NIS at which the colour is full: eight times too large."""
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 _FONT = {"size": 12}
 _KEPT = "kept"
 """Name under which plotly keeps what a person zoomed, while a figure grows."""
 _MARGIN = {"l": 60, "r": 14, "t": 10, "b": 44}
+_LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": 10}}
+_ENTRY = 176
+"""Width of the words of an entry of the legend (px): two stand beside each other in a column of 470."""
 _SENSORS = ("gyro", "accel")
 
 
@@ -67,24 +71,25 @@ def sigmas(curves: Drawn, fallen: Sequence[Falling]) -> Figure:
         )
     figure.x_axes(title="time of the test (min)", rangemode="tozero", standoff=4)
     figure.y_axes(title="sigma over that at the start", type="log", dtick=1, exponentformat="power", standoff=4)
-    legend = {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top", "font": {"size": 11}}
-    return _laid_out(figure, HEIGHT + 60, showlegend=True, legend=legend, margin=_MARGIN | {"b": 104})
+    legend = _LEGEND | {"x": -0.2, "y": -0.24, "entrywidth": _ENTRY}
+    more = {"showlegend": True, "legend": legend, "margin": _MARGIN | {"b": 124}, "uirevision": _KEPT}
+    return _laid_out(figure, HEIGHT + 60, **more)
 
 
 def nis_map(nis: Sequence[tuple[int, Mapping[str, float]]]) -> Figure:
     """Draw how large the innovations of each stop are beside what was promised; 1 is right."""
     channels = list(dict.fromkeys(channel for _, values in nis for channel in values))
     value = np.array([[values.get(channel, math.nan) for _, values in nis] for channel in channels])
-    with np.errstate(divide="ignore"):
-        power = np.log2(value)
-    numbered = len(nis) <= _MOST_NUMBERED
+    # Of three degrees of freedom, as a stop has them in position, a tenth is nothing unusual and ten is.
+    tint = np.where(value > 1.0, np.log2(np.maximum(value, 1.0)), value - 1.0)
+    numbered = len(nis) <= _MOST_WHOLE
     text = [[_ratio(v) if numbered else "" for v in row] for row in value.tolist()]
     figure = Figure()
     figure.add(
         "heatmap",
         x=[str(stop) for stop, _ in nis],
         y=channels,
-        z=power,
+        z=tint,
         customdata=value,
         text=text,
         texttemplate="%{text}",
@@ -110,9 +115,15 @@ def heat_map(seen: SeenDiagnosis) -> Figure:
     """Draw the mean innovation of every channel at every stop, over its sigma."""
     figure = evidence_figures.deviates(seen.stops, seen.channels, seen.heat, "stop", "channel", _MAP)
     if len(seen.stops) > _MOST_NUMBERED:
-        figure.data[0]["text"] = [[evidence_figures.sign(v) for v in row] for row in seen.heat.tolist()]
+        write = _whole if len(seen.stops) <= _MOST_WHOLE else evidence_figures.sign
+        figure.data[0]["text"] = [[write(v) for v in row] for row in seen.heat.tolist()]
     figure.data[0] |= {"showscale": False, "textfont": {"size": _CELL}}
     return _by_stop(figure, _MAP)
+
+
+def _whole(value: float) -> str:
+    """Write what stands out as a whole number."""
+    return f"{value:+.0f}".replace("-", "\N{MINUS SIGN}") if abs(value) > NOTABLE else ""
 
 
 def _by_stop(figure: Figure, height: int) -> Figure:
@@ -144,8 +155,8 @@ def errors(found: Sequence[tuple[int, Rows]]) -> Figure:
     scale = "log" if largest > 10.0 else "linear"
     figure.x_axes(title="up to stop", dtick=1 if len(found) < 10 else None, standoff=4)
     figure.y_axes(title="one stop left out (sigma)", standoff=4, type=scale)
-    legend = {"orientation": "h", "x": 0, "y": -0.24, "yanchor": "top", "font": {"size": 11}}
-    return _laid_out(figure, HEIGHT, showlegend=True, legend=legend, margin=_MARGIN | {"b": 84})
+    more = {"showlegend": True, "legend": _LEGEND, "margin": _MARGIN | {"b": 84}, "uirevision": _KEPT}
+    return _laid_out(figure, HEIGHT, **more)
 
 
 def nothing(words: str) -> Figure:
@@ -166,7 +177,7 @@ def _number(text: str) -> float | None:
 
 
 def _laid_out(figure: Figure, height: int, **more: Any) -> Figure:
-    return lay_out(figure, height, **{"font": _FONT, "uirevision": _KEPT, **more})
+    return lay_out(figure, height, **{"font": _FONT, **more})
 
 
 def finished(figure: Figure, look: Any) -> Any:

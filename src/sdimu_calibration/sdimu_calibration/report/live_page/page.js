@@ -22,6 +22,11 @@
 
   // A component of Dash lacks a name, and hides an element that a keyboard still reaches.
   function mend() {
+    // The button comes after the page has told its theme.
+    document.querySelectorAll('[data-switch-theme]').forEach(function (b) {
+      var words = window.sdimuTheme() === 'dark' ? 'Light page' : 'Dark page';
+      if (b.textContent !== words) { b.textContent = words; }
+    });
     document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
     if (at('candidate')) { at('candidate').setAttribute('aria-label', 'Effect to add'); }
   }

@@ -67,11 +67,11 @@ def candidates(seen: SeenDiagnosis) -> list[Any]:
     if not seen.ranking:
         return [html.P(NOT_YET, className="quiet")]
     rows = [
-        html.Tr([html.Td(html.Button(label, className="row")), html.Td(score)], **{"data-candidate": label})
+        html.Tr(html.Td([html.Button(label, className="row"), html.Span(score)]), **{"data-candidate": label})
         for label, score in seen.ranking
     ]
     return [
-        html.P(f"Score and size of each alone; {seen.reaches}. Click one to add it.", className="quiet"),
+        html.P(f"Score and size of each alone; {seen.reaches}. Click one to choose it.", className="quiet"),
         html.Div(html.Table(html.Tbody(rows)), className="scroll"),
     ]
 
