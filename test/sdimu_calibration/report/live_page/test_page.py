@@ -137,7 +137,7 @@ def test_a_page_without_a_message_says_that_it_waits():
     shown = Page(LiveRecord(TEST)).ask()
     assert "waiting" in words(shown["place"]["children"])
     assert shown["verdict"]["className"] == "verdict neutral"
-    assert "No diagnosis yet" in words(shown["candidates"]["children"])
+    assert "No diagnosis so far" in words(shown["candidates"]["children"])
 
 
 def test_the_button_adds_what_was_chosen_and_the_answer_is_one_line():

@@ -27,7 +27,7 @@ _TONES = {
     Verdict.DATA_FAULT: ("bad", "\N{HEAVY BALLOT X}"),
 }
 _DOUBTFUL = ("doubtful", "\N{WARNING SIGN}")
-NOT_YET = "No diagnosis yet: the first comes at the end of the first stops."
+NOT_YET = "No diagnosis so far; one is made at the end of each stop."
 
 
 def place(head: Head) -> Any:
