@@ -1,7 +1,7 @@
 """OpenVINS' YAML of an IMU, ``kalibr_imu_chain.yaml``, model ``kalibr``.
 
-OpenVINS (RPNG, ov_msckf/src/core/VioManagerOptions.h, docs/propagation) reads Tw, Ta, R_IMUtoGYRO, R_IMUtoACC and Tg,
-and corrects
+OpenVINS (RPNG, ov_msckf/src/core/VioManagerOptions.h, docs/propagation-analytical.dox) reads Tw, Ta, R_IMUtoGYRO,
+R_IMUtoACC and Tg, and corrects
 
     a = R_IMUtoACC' inv(Ta) (a measured - b_a),     w = R_IMUtoGYRO' inv(Tw) (w measured - b_g - Tg a)
 
