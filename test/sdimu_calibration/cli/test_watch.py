@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from sdimu_calibration.cli.watch import Outline, Watch
+from sdimu_calibration.cli.watch import Watch
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.live_seen import Outline
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import falling, light
 

@@ -20,20 +20,27 @@ _MOST_HZ = 1e6
 def export(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="result.json of a calibration, or its folder.")],
     form: Annotated[
-        str, typer.Option("--format", help="matrices, kalibr, imu_tk, px4, ardupilot, c-header, yaml or csv.")
+        str,
+        typer.Option(
+            "--format",
+            help="matrices, kalibr, openvins, imu_tk, px4, ardupilot, c-header, yaml, csv; noise alone: kalibr-noise, "
+            "gtsam.",
+        ),
     ] = "matrices",
     out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
     imu: Annotated[
         str | None,
-        typer.Option(help="IMU whose noise goes in the kalibr form: name or path. That of the calibration by default."),
+        typer.Option(
+            help="IMU whose noise is written, where a form has a place for it; that of the calibration by default."
+        ),
     ] = None,
-    rate: Annotated[float, typer.Option(help="Sample rate for the kalibr form (Hz).")] = 100.0,
+    rate: Annotated[float, typer.Option(help="Sample rate, where a form has a place for it (Hz).")] = 100.0,
     temperature: Annotated[
         float | None, typer.Option(metavar="DEGC", help="Temperature at which matrices and biases are stated.")
     ] = None,
     effect: OwnEffectOption = None,
 ) -> None:
-    """Write a result as matrices, Kalibr YAML, imu_tk files, parameters of PX4 or ArduPilot, a C header, YAML or CSV.
+    """Write a result for another program: matrices, files of Kalibr, OpenVINS, GTSAM, imu_tk, PX4, C, YAML or CSV.
 
     A result that is not to be trusted is written all the same; stderr says why it is not.
     """
@@ -57,7 +64,7 @@ def export(
     console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)
-    if form == "kalibr":
+    if form in FORMS and FORMS[form].has_noise:
         console.print(f"noise densities are those of {whose}", soft_wrap=True, markup=False, highlight=False)
     console.print(f"body frame: {calibration.body_frame}; {' '.join(map(str, done.files))}", soft_wrap=True)
     warn(doubts)

@@ -5,52 +5,18 @@ In a terminal a picture that changes in place; elsewhere, in a file or a pipe, o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.live_seen import Outline, Seen, left_words, place_words, time_words
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
-
-
-class Seen(Protocol):
-    """What is watched: `nodes.monitor.Progress`, of which this layer must not know."""
-
-    stop: int
-    phase: str
-    table_s: float
-    sigmas: dict[str, float]
-    first: dict[str, float]
-    nis: dict[str, float]
-    verdict: str
-    diagnosis: SeenDiagnosis
-
-
-@dataclass(frozen=True)
-class Outline:
-    """What is known of a test before it runs.
-
-    Attributes
-    ----------
-    duration_s : float
-        0 where nobody knows.
-    stops : int
-        0 where nobody knows.
-    units : mapping of str to str
-        Customary unit by coefficient.
-    """
-
-    duration_s: float
-    stops: int
-    effects: Sequence[str]
-    units: Mapping[str, str]
 
 
 class Watch:
@@ -103,29 +69,12 @@ class Watch:
     def line(self, seen: Seen, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
-            self._place(seen),
-            f"{self._time(seen)}, {self.left(seen, wall_s)}",
+            place_words(self._test, seen),
+            f"{time_words(self._test, seen)}, {left_words(self._test, seen, wall_s)}",
             sigma_words(self._falling(seen)),
             light(seen.nis, seen.verdict),
         ]
         return "; ".join(part for part in parts if part)
-
-    def _place(self, seen: Seen) -> str:
-        of = f" of {self._test.stops - 1}" if self._test.stops else ""
-        return f"stop {seen.stop}{of} {seen.phase}"
-
-    def _time(self, seen: Seen) -> str:
-        of = f" of {self._test.duration_s:.0f}" if self._test.duration_s else ""
-        return f"{seen.table_s:.0f}{of} s"
-
-    def left(self, seen: Seen, wall_s: float) -> str:
-        """Say how long it will take at the pace so far."""
-        if not self._test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
-            return "time left unknown"
-        pace = seen.table_s / wall_s
-        rest = max(0.0, self._test.duration_s - seen.table_s) / pace
-        words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
-        return f"{words} left at {pace:.3g} times real time"
 
     def picture(self, seen: Seen, streaming: bool, wall_s: float) -> RenderableType:
         """Return what the terminal shows."""
@@ -135,13 +84,13 @@ class Watch:
         from rich.text import Text
 
         fine = seen.verdict == Verdict.CONSISTENT or not seen.nis
-        stage = self._place(seen) if streaming else "last calibration"
-        left = self.left(seen, wall_s) if streaming else "no more to come"
+        stage = place_words(self._test, seen) if streaming else "last calibration"
+        left = left_words(self._test, seen, wall_s) if streaming else "no more to come"
         head = Table.grid(padding=(0, 1))
         head.add_row(
             Text(stage, style="bold"),
             ProgressBar(self._test.duration_s or None, seen.table_s, width=30),
-            f"{self._time(seen)}, {left}",
+            f"{time_words(self._test, seen)}, {left}",
         )
         sigmas = Table.grid(padding=(0, 2))
         for f in self._falling(seen):

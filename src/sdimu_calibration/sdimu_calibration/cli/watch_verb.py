@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdimu_calibration.cli.option_groups import with_options
+from sdimu_calibration.cli.serving import LivePage, PageOptions
 from sdimu_calibration.core.data_error import DataError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.cli.processes import RunningTest
-    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.nodes.monitor import Monitor
+    from sdimu_calibration.report.live_page.record import End, LiveRecord
+    from sdimu_calibration.report.live_seen import Outline
 
 
+@with_options
 def watch(
     model: Annotated[
         str | None,
@@ -35,13 +39,18 @@ def watch(
         list[str] | None,
         typer.Option(metavar="EFFECT", help="Add an effect to the model of the running test; repeatable."),
     ] = None,
+    *,
+    page: PageOptions,
 ) -> None:
     """Watch a running test: stop, sigmas, light of the innovations, and the diagnosis at the end of each stop."""
     import time
+    from contextlib import closing
 
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import enter_domain
+    from sdimu_calibration.report.live_page.record import LiveRecord
 
+    page.check()
     test = watched(domain)
     outline, first = _outline(test, model, tuple(add or ()))
     if test is not None:
@@ -54,21 +63,33 @@ def watch(
     end = f"ends after {seconds:g} s" if seconds else "ends with the test, or with Ctrl-C"
     where = "" if test is None else f", the run into {test.folder}"
     console.print(f"watching ROS domain {used}{where}; {end}", highlight=False, soft_wrap=True)
-    monitor = Monitor(None if test is None else test.start_ns, first)
-    try:
+    start_ns = None if test is None else test.start_ns
+    record = LiveRecord(outline, "" if test is None else test.folder)
+    with LivePage(page, record, console) as shown, closing(Monitor(start_ns, first)) as monitor:
         if add and (why := monitor.add(add)):
             raise DataError(f"--add {' '.join(add)}: {why}")
-        ended = _follow(console, monitor, outline, used if test is not None else None, seconds)
-    finally:
-        monitor.close()
-    if not monitor.progress.heard:
-        raise DataError(
-            f"ROS domain {used}: nothing heard in {time.monotonic() - begun:.0f} s (is a test running? "
-            "state its --domain)"
-        )
-    if ended:
-        results = "" if test is None else f"; results in {test.folder}"
+        shown.begin()
+        watching = _Watching(console, monitor, outline, record)
+        is_over = _follow(watching, used if test is not None else None, seconds)
+        if not monitor.progress.heard:
+            raise DataError(
+                f"ROS domain {used}: nothing heard in {time.monotonic() - begun:.0f} s (is a test running? "
+                "state its --domain)"
+            )
+        record.end(_end(is_over, seconds, record.folder))
+    if is_over:
+        results = f"; results in {record.folder}" if record.folder else ""
         console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
+
+
+def _end(is_over: bool, seconds: float, folder: str) -> End:
+    """Say on the page how watching ended."""
+    from sdimu_calibration.cli.serving import ended
+    from sdimu_calibration.report.live_page.record import End
+
+    if is_over:
+        return ended(folder, "the report is there some seconds later" if folder else "")
+    return End(True, f"Watched for {seconds:g} s, as asked; the test goes on.")
 
 
 @dataclass
@@ -129,10 +150,10 @@ def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     """Outline of a test, and sigmas (SI) at its begin by coefficient: those of the IMU's file, where it is known."""
     import numpy as np
 
-    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
     from sdimu_calibration.core.effects.body_frame import frame_jacobian
     from sdimu_calibration.core.effects.imu_model import prior_size
+    from sdimu_calibration.report.live_seen import Outline
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.effect_file import extended_model
 
@@ -150,7 +171,17 @@ def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     return Outline(test.duration_s, test.stops, keys, units), first
 
 
-def _follow(console: Console, monitor: Monitor, outline: Outline, domain: int | None, seconds: float) -> bool:
+@dataclass(frozen=True)
+class _Watching:
+    """Who shows a test, and what it is seen by."""
+
+    console: Console
+    monitor: Monitor
+    outline: Outline
+    record: LiveRecord
+
+
+def _follow(watching: _Watching, domain: int | None, seconds: float) -> bool:
     """Show a test until its end, or for a while; whether it has ended.
 
     Parameters
@@ -164,11 +195,14 @@ def _follow(console: Console, monitor: Monitor, outline: Outline, domain: int | 
     from sdimu_calibration.cli.watch import Watch
 
     begun = time.monotonic()
-    pace = Pace()
-    with Watch(console, outline) as shown:
+    pace, monitor = Pace(), watching.monitor
+    with Watch(watching.console, watching.outline) as shown:
         while not seconds or time.monotonic() - begun < seconds:
             now = monitor.listen(0.2)
-            shown.show(now, True, pace.wall(now.table_s, time.monotonic() - begun))
+            wall_s = pace.wall(now.table_s, time.monotonic() - begun)
+            shown.show(now, True, wall_s)
+            watching.record.take(now, True, wall_s)
+            watching.record.carry_out(monitor.add)
             if not is_held(domain) if domain is not None else monitor.left():
                 return True
     return False

@@ -13,6 +13,7 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.option_groups import with_options, words_of
 from sdimu_calibration.cli.options import BagsArgument, Recorded, SetOption
 from sdimu_calibration.cli.progress import bar
+from sdimu_calibration.cli.serving import HOST, PORT, check_port
 from sdimu_calibration.cli.set_run import single
 from sdimu_calibration.core.data_error import DataError
 
@@ -24,14 +25,12 @@ if TYPE_CHECKING:
 
     Judge = Callable[[Sequence[str], Progress], SetDiagnosis]
 
-HOST = "127.0.0.1"
-
 
 @dataclass(frozen=True)
 class Served:
     """Where the page is served, and what it begins with."""
 
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = 8050
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port on this machine.")] = PORT
     host: Annotated[str, typer.Option(help="Address to listen on; others than this machine only when asked.")] = HOST
     model: Annotated[
         str | None, typer.Option(help="Model to start from: name in config/model or path; baseline when left out.")
@@ -43,7 +42,6 @@ class Served:
 def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -> None:
     """Open recordings in the browser; runs until it is stopped with Ctrl-C."""
     import logging
-    import socket
     from functools import partial
 
     from werkzeug.serving import make_server
@@ -57,13 +55,7 @@ def workbench(bags: BagsArgument = None, *, served: Served, opening: Recorded) -
     from sdimu_calibration.storage.opening import open_test
 
     host, port, set_file = served.host, served.port, served.set_file
-    with socket.socket() as probe:
-        try:
-            taken = probe.connect_ex((host, port)) == 0
-        except OSError as error:
-            raise DataError(f"--host {host}: {error.strerror or error}; name an address of this machine") from error
-        if taken:
-            raise DataError(f"port {port} is taken (choose another with --port)")
+    check_port(host, port)
     specification, wanted = opening.specification, named_model(served.model, [])
     if opening.site is not None:
         load_site(opening.site)

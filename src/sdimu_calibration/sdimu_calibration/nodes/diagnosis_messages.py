@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from array import array
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,8 +18,11 @@ from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.credits import header
 from sdimu_calibration.report.data import places
-from sdimu_calibration.report.live_text import SeenDiagnosis, best_ranked, ladder_rows, model_name, size
+from sdimu_calibration.report.live_text import SeenDiagnosis, SeenFamily, best_ranked, ladder_rows, model_name, size
+from sdimu_calibration.report.odds_section import family_in_words
 
+NOTHING = "nothing_missing"
+"""Key of the probability that no effect is missing."""
 _MOST_RANKED = 12
 """Number of candidates in the table for people."""
 
@@ -35,6 +40,9 @@ def diagnosis(stamp_ns: int, found: LiveDiagnosis) -> DiagnosticArray:
         ]
     if found.probabilities is not None:
         parts.append(_status("probabilities", "of what the model misses, all data", _odds(found.probabilities)))
+        parts.append(
+            _status("families", "the same, each family with its members as JSON", _folded(found.probabilities))
+        )
     return DiagnosticArray(header=header(stamp_ns), status=parts)
 
 
@@ -70,6 +78,7 @@ def seen_diagnosis(message: DiagnosticArray, before: SeenDiagnosis) -> SeenDiagn
     parts = {status.name: status for status in message.status}
     tables = {name: tuple((v.key, v.value) for v in status.values) for name, status in parts.items()}
     about = dict(tables["verdict"])
+    odds = dict(tables.get("probabilities", ()))
     return replace(
         before,
         stop=int(about["stop"]),
@@ -78,6 +87,8 @@ def seen_diagnosis(message: DiagnosticArray, before: SeenDiagnosis) -> SeenDiagn
         reaches=parts["ranking"].message if "ranking" in parts else "",
         ranking=tables.get("ranking", ()),
         ladder=tables.get("ladder", ()),
+        nothing=float(odds.get(NOTHING, math.nan)),
+        families=tuple(_family(name, told) for name, told in tables.get("families", ())),
     )
 
 
@@ -108,13 +119,26 @@ def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:
 
 def _odds(told: Probabilities) -> Iterable[tuple[str, str]]:
     """Probabilities with all their digits: of nothing, of families on a sensor, of their members."""
-    yield "nothing_missing", repr(told.nothing)
+    yield NOTHING, repr(told.nothing)
     for family in told.families:
         yield f"{family.family} {family.sensor}".strip(), repr(family.probability)
         for member in family.members:
             yield member.label, repr(member.probability)
     for noise in told.noise:
         yield f"noise {noise.triad} {noise.kind}", repr(noise.probability)
+
+
+def _folded(told: Probabilities) -> Iterable[tuple[str, str]]:
+    """Families in words, each with its probability and those of its members."""
+    for family in told.families:
+        members = [[member.label, member.probability] for member in family.members]
+        yield family_in_words(family), json.dumps({"probability": family.probability, "members": members})
+
+
+def _family(name: str, told: str) -> SeenFamily:
+    read = json.loads(told)
+    members = tuple((str(label), float(p)) for label, p in read["members"])
+    return SeenFamily(name, float(read["probability"]), members)
 
 
 def _last_stop(found: LiveDiagnosis) -> list[tuple[str, str]]:

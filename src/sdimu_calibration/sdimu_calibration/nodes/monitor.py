@@ -19,9 +19,9 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from sdimu_calibration.nodes.credits import LATCHED, NS, to_ns
+from sdimu_calibration.nodes.credits import HISTORY, LATCHED, NS, to_ns
 from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat_map
-from sdimu_calibration.report.live_text import SeenDiagnosis
+from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
 ANSWER_S = 20.0
@@ -48,6 +48,12 @@ class Progress:
         The newest one; of stop -1 before the first.
     heard : bool
         Any message has come.
+    nis_by_stop : dict of int to dict of str to float
+        As `nis`, of every stop that was heard of.
+    ladders : dict of int to tuple of (str, str)
+        Models and their errors, by the stop that the diagnosis is of.
+    choices : list of SeenChoice
+        Of a test that chooses its turns, the newest last.
     """
 
     stop: int = 0
@@ -60,6 +66,9 @@ class Progress:
     verdict: str = ""
     diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
     heard: bool = False
+    nis_by_stop: dict[int, dict[str, float]] = field(default_factory=dict)
+    ladders: dict[int, Rows] = field(default_factory=dict)
+    choices: list[SeenChoice] = field(default_factory=list)
 
 
 class Monitor:
@@ -83,8 +92,9 @@ class Monitor:
         self._node.create_subscription(DiagnosticArray, "rate_table/status", self._take_status, GLANCE)
         self._node.create_subscription(JointState, "calibration/coefficients", self._take_coefficients, GLANCE)
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, GLANCE)
-        self._node.create_subscription(DiagnosticArray, "calibration/diagnosis", self._take_diagnosis, LATCHED)
+        self._node.create_subscription(DiagnosticArray, "calibration/diagnosis", self._take_diagnosis, HISTORY)
         self._node.create_subscription(Float64MultiArray, "calibration/heat_map", self._take_heat_map, LATCHED)
+        self._node.create_subscription(DiagnosticArray, "adaptive/choice", self._take_choice, HISTORY)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._never = Future()
@@ -159,8 +169,9 @@ class Monitor:
         if self._start_ns is not None:
             self.progress.filter_s = (to_ns(message.header.stamp) - self._start_ns) / NS
         self.progress.sigmas = dict(zip(message.name, message.effort, strict=True))
-        if not self.progress.first:
-            self.progress.first = dict(self.progress.sigmas)
+        for name, sigma in self.progress.sigmas.items():
+            # Those of an effect that is added come later than the others.
+            self.progress.first.setdefault(name, sigma)
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         self.progress.heard = True
@@ -170,6 +181,8 @@ class Monitor:
                 self.progress.verdict = values["verdict"]
                 nis = {key: value for key, value in values.items() if key.startswith(_NIS)}
                 self.progress.nis = {key.removeprefix(_NIS): float(value) for key, value in nis.items()}
+                if self.progress.nis and "stop" in values:
+                    self.progress.nis_by_stop[int(values["stop"])] = self.progress.nis
 
     def _take_heat_map(self, message: Float64MultiArray) -> None:
         self.progress.heard = True
@@ -177,7 +190,15 @@ class Monitor:
 
     def _take_diagnosis(self, message: DiagnosticArray) -> None:
         self.progress.heard = True
-        self.progress.diagnosis = seen_diagnosis(message, self.progress.diagnosis)
+        self.progress.diagnosis = found = seen_diagnosis(message, self.progress.diagnosis)
+        if found.ladder:
+            self.progress.ladders[found.stop] = found.ladder
+
+    def _take_choice(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {entry.key: entry.value for entry in status.values}
+            choice = SeenChoice(status.message, float(values["minutes"]), float(values["worst"]))
+            self.progress.choices.append(choice)
 
 
 _NIS = "stop_nis_"

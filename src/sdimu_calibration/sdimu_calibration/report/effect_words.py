@@ -26,7 +26,7 @@ def effect_of_key(key: str) -> Effect | None:
 def title_of(key: str) -> str:
     """Title of an effect; of one that the registry does not know, its key in words."""
     effect = effect_of_key(key)
-    return in_words(key) if effect is None else effect.title + effect.variant
+    return in_words(key) if effect is None else _with_variant(effect.title, effect)
 
 
 def tip(words: str, effect: Effect | None, names: Sequence[str] = ()) -> str:
@@ -57,5 +57,10 @@ def family_words(group: Sequence[Found]) -> str:
         return f"<code>{escape(first.label)}</code>"
     stem = first.family
     axes = [label.partition("(")[0].removeprefix(stem).strip("_") for label in labels]
-    words = f"{first.effect.title}{', ' + ', '.join(axes) if any(axes) else ''}{first.effect.variant}"
-    return tip(words, first.effect, labels)
+    words = f"{first.effect.title}{', ' + ', '.join(axes) if any(axes) else ''}"
+    return tip(_with_variant(words, first.effect), first.effect, labels)
+
+
+def _with_variant(words: str, effect: Effect) -> str:
+    """Put a time constant behind the words that it belongs to: ``bias warm-up, y (tau=1200 s)``."""
+    return f"{words} {effect.variant}".rstrip()

@@ -27,6 +27,34 @@ _NAMED = 2
 
 
 @dataclass(frozen=True)
+class SeenFamily:
+    """A family of effects, its probability, and that of each of its members, by label."""
+
+    name: str
+    probability: float
+    members: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class SeenChoice:
+    """A choice of a test that chooses its turns.
+
+    Attributes
+    ----------
+    text : str
+        Move and reason, or why the test ends.
+    minutes : float
+        Of the test, when it was made.
+    worst : float
+        Largest sigma over its limit (1).
+    """
+
+    text: str
+    minutes: float
+    worst: float
+
+
+@dataclass(frozen=True)
 class SeenDiagnosis:
     """A live diagnosis as its topics tell it.
 
@@ -40,6 +68,10 @@ class SeenDiagnosis:
     stops : tuple of str, length s
     heat : ndarray, shape (c, s)
         Mean innovation over its sigma.
+    nothing : float
+        Probability that no effect is missing; NaN before the test has ended.
+    families : tuple of SeenFamily
+        The likeliest first; none before the test has ended.
     """
 
     stop: int = -1
@@ -51,6 +83,8 @@ class SeenDiagnosis:
     channels: tuple[str, ...] = ()
     stops: tuple[str, ...] = ()
     heat: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    nothing: float = math.nan
+    families: tuple[SeenFamily, ...] = ()
 
     @property
     def line(self) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.effect_words import effect_of_key
 from sdimu_calibration.report.groups import groups, title
 
 _FINE, _ALARM = "\N{BLACK CIRCLE}", "\N{BLACK UP-POINTING TRIANGLE}"
@@ -37,12 +38,20 @@ def falling(
     """
     names = [name for name in now if first.get(name, 0.0) > 0.0]
     out = []
-    for effect, members in groups(names, effects).items():
+    # What was added while the test runs is an effect of its own, though its name begins as that of another.
+    own = [name for name in names if name not in units]
+    for effect, members in groups(names, [*effects, *own]).items():
         largest = max(now[names[k]] for k in members)
         start = max(first[names[k]] for k in members)
-        unit = units.get(names[members[0]], "1")
+        unit = units.get(names[members[0]]) or _unit(names[members[0]])
         out.append(Falling(effect, from_si(largest, unit), unit, largest / start))
     return sorted(out, key=lambda f: -f.share)
+
+
+def _unit(coefficient: str) -> str:
+    """Customary unit of a coefficient that was added while the test runs; 1 for one that a file defines."""
+    effect = effect_of_key(coefficient)
+    return "1" if effect is None else next(p.display_unit for p in effect.parameters if p.name == coefficient)
 
 
 def light(nis: Mapping[str, float], verdict: str) -> str:

@@ -16,6 +16,7 @@ from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, print_advi
 from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
+from sdimu_calibration.cli.serving import LivePage, PageOptions, ended
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import same_file, written_together
 from sdimu_sim.cli.options import SeedOption, World
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.cli.processes import Children, RunningTest
-    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
     from sdimu_calibration.core.results import Calibration
+    from sdimu_calibration.report.live_page.record import LiveRecord
+    from sdimu_calibration.report.live_seen import Outline
 
 STALL_S = 180.0
 START_NS = 1_700_000_000_000_000_000
@@ -68,6 +70,7 @@ class LiveTest:
 def run(
     test: LiveTest,
     world: World,
+    page: PageOptions,
     domain: DomainOption = None,
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite an earlier run in that folder.")] = False,
@@ -81,14 +84,18 @@ def run(
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain, own_folder
     from sdimu_calibration.core.compiled import never_compiled
+    from sdimu_calibration.report.live_page.record import LiveRecord
 
     _check_choosing(test.adaptive, test.ask, test.plan)
+    page.check()
     options = _parameters(test, world, out)
     duration = _check(options)
     if test.adaptive is not None:
         duration = _choosing(options, test.adaptive, test.ask)
     console = make_console()
-    with own_folder(out):
+    outline = _test(None if test.adaptive else test.followed, test.model, duration)
+    record = LiveRecord(outline, str(out.resolve()))
+    with own_folder(out), LivePage(page, record, console) as shown:
         begun = time.monotonic()
         about = _about(options, test, duration, out)
         with own_domain(out / "log", domain, about) as used, Children(out / "log") as children:
@@ -97,12 +104,14 @@ def run(
             if never_compiled():
                 console.print("compiling the numerical loops, once on this machine: about a minute without samples")
             _start(children, options, out / "bag", replace)
-            shown = _test(None if test.adaptive else test.followed, test.model, duration)
-            streamed = _watch(console, children, shown)
+            shown.begin()
+            streamed = _watch(console, children, outline, record)
+        record.tell("the report is being made")
         wall = time.monotonic() - begun
         end = _tell_choices(console, out / "choices.json") if test.adaptive is not None else None
         result = _report(console, out, world.site, test)
         _say_measured(console, out, result, streamed, wall)
+        record.end(ended(record.folder))
     _leave(result, test.adaptive, end)
 
 
@@ -241,7 +250,7 @@ def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, re
         children.start("adaptive", "sdimu_calibration.nodes.adaptive_node", options["adaptive"])
 
 
-def _watch(console: Console, children: Children, test: Outline) -> float:
+def _watch(console: Console, children: Children, test: Outline, record: LiveRecord) -> float:
     """Show the progress until every node has left; wall time (s) that the data took."""
     import time
 
@@ -268,6 +277,8 @@ def _watch(console: Console, children: Children, test: Outline) -> float:
                 if now - moved > STALL_S:
                     raise DataError(f"nothing has moved for {STALL_S:.0f} s ({', '.join(running)} still running)")
                 watch.show(now_at, "sdimu" in running, streamed)
+                record.take(now_at, "sdimu" in running, streamed)
+                record.carry_out(monitor.add)
     finally:
         monitor.close()
     return streamed
@@ -275,8 +286,8 @@ def _watch(console: Console, children: Children, test: Outline) -> float:
 
 def _test(plan: str | None, model: str, duration: float) -> Outline:
     """Collect what is known of the test before it runs."""
-    from sdimu_calibration.cli.watch import Outline
     from sdimu_calibration.core.effects import selection
+    from sdimu_calibration.report.live_seen import Outline
     from sdimu_calibration.storage.files.config import load_plan
     from sdimu_calibration.storage.files.effect_file import extended_model
 

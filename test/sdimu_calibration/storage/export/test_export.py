@@ -19,6 +19,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.storage.export import FORMS, export
+from sdimu_calibration.storage.export.shared import number
 
 BASELINE = (
     "gyro_bias",
@@ -98,6 +99,21 @@ def by_kalibr(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.
     return seen @ C, force
 
 
+def by_openvins(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Read as VioManagerOptions does, correct as the propagation does; OpenCV asks for the first line."""
+    first, _, rest = path.read_text().partition("\n")
+    assert first == "%YAML:1.0"
+    read = yaml.safe_load(rest)["imu0"]
+    Tw, Ta, Tg, R_gyro, R_accel = (np.array(read[k]) for k in ("Tw", "Ta", "Tg", "R_IMUtoGYRO", "R_IMUtoACC"))
+    assert read["model"] == "kalibr"
+    for T in (Tw, Ta):
+        assert np.all(np.triu(np.linalg.inv(T), 1) == 0.0), "the lower triangle alone is read"
+    for R in (R_gyro, R_accel):
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=ROUNDING)
+    force = (f - read["accelerometer_bias"]) @ np.linalg.inv(Ta).T @ R_accel
+    return (w - read["gyroscope_bias"] - force @ Tg.T) @ np.linalg.inv(Tw).T @ R_gyro, force
+
+
 def by_imu_tk(path: Path, w: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Read as CalibratedTriad::load does: the first 21 numbers; apply as unbiasNormalize does."""
     out = []
@@ -161,12 +177,55 @@ READERS: dict[str, Apply] = {
     "yaml": by_yaml,
     "csv": by_csv,
     "kalibr": by_kalibr,
+    "openvins": by_openvins,
     "imu_tk": by_imu_tk,
     "c-header": by_c,
 }
 
 
-@pytest.mark.parametrize("form", FORMS)
+def kalibr_noise(path: Path) -> tuple[float, ...]:
+    """Read as ImuParameters of Kalibr does; white noise, then random walks, accelerometers first, and the rate."""
+    read = yaml.safe_load(path.read_text())
+    assert read["rostopic"] == "/imu/data"
+    names = ("accelerometer_noise_density", "gyroscope_noise_density", "accelerometer_random_walk")
+    return (*(read[name] for name in names), read["gyroscope_random_walk"], read["update_rate"])
+
+
+def gtsam_noise(path: Path) -> tuple[float, ...]:
+    """Read as loadKittiData of GTSAM's example does: a line is passed over, twelve numbers stand in the next."""
+    numbers = [float(word) for word in path.read_text().splitlines()[1].split()]
+    assert len(numbers) == 12
+    assert numbers[:6] == [0.0] * 6, "the example wants the IMU to be the body"
+    accel, gyro, _, accel_step, gyro_step, dt = numbers[6:]
+    return accel, gyro, accel_step / np.sqrt(dt), gyro_step / np.sqrt(dt), 1.0 / dt
+
+
+NOISE_READERS = {"kalibr-noise": kalibr_noise, "gtsam": gtsam_noise}
+
+
+@pytest.mark.parametrize("value", [3e-05, 1e16, 1.5e-300, 0.0, -2e-7, 0.1, 1e5])
+def test_a_number_is_read_as_the_same_number(value: float) -> None:
+    # YAML 1.1 takes 3e-05 for a text.
+    assert yaml.safe_load(number(value)) == value
+    assert float(number(value)) == value
+
+
+def test_every_form_is_read_back():
+    assert set(READERS) | set(NOISE_READERS) == set(FORMS)
+
+
+@pytest.mark.parametrize("form", NOISE_READERS)
+def test_a_form_of_noise_keeps_every_density_and_says_that_coefficients_are_not_in_it(form, tmp_path: Path) -> None:
+    imu = replace(IMU, accel_random_walk=3e-5, gyro_random_walk=2e-7)
+    done = export(form, tmp_path / FORMS[form].file_name, result(*BASELINE), imu, rate_hz=200.0)
+    assert NOISE_READERS[form](done.files[0]) == pytest.approx((1e-3, 1e-4, 3e-5, 2e-7, 200.0), rel=1e-12)
+    text = done.files[0].read_text()
+    assert "sigma of a mean over T seconds = density / sqrt(T)" in text
+    assert "NOT IN THIS FILE: every coefficient" in text
+    assert len(done.missing) == 1
+
+
+@pytest.mark.parametrize("form", READERS)
 def test_a_form_applied_to_raw_samples_gives_the_numbers_of_the_core(form: str, tmp_path: Path) -> None:
     made = result(*BASELINE)
     if form == "imu_tk":  # no place for sensitivity to force: the rest must agree
@@ -261,7 +320,7 @@ def test_coefficients_in_a_table_say_from_which_temperature_they_count(tmp_path:
     assert (tmp_path / "x.csv").read_text().splitlines()[-1] == f"start_temperature_degc,{START},0.0,degC"
 
 
-@pytest.mark.parametrize("form", sorted(FORMS.keys() - {"csv"}))
+@pytest.mark.parametrize("form", sorted(READERS.keys() - {"csv"}))
 def test_hysteresis_and_an_unknown_reference_are_left_out_and_said(form: str, tmp_path: Path) -> None:
     done = export(form, tmp_path / "x.txt", warm_result("gyro_bias_temperature_hysteresis"), IMU)
     assert sum("gyro_bias_temperature_hysteresis_" in line for line in done.missing) == 3
@@ -272,7 +331,7 @@ def test_hysteresis_and_an_unknown_reference_are_left_out_and_said(form: str, tm
         export(form, tmp_path / "y.txt", unstated, IMU, temperature_degc=20.0)
 
 
-@pytest.mark.parametrize("form", sorted(FORMS.keys() - {"csv"}))
+@pytest.mark.parametrize("form", sorted(READERS.keys() - {"csv"}))
 def test_what_a_form_cannot_hold_is_said_in_the_file_and_to_the_user(form: str, tmp_path: Path) -> None:
     done = export(form, tmp_path / "x.txt", result(*BASELINE, "accel_quadratic"), IMU)
     for file in done.files:
@@ -297,11 +356,12 @@ def test_imu_tk_says_that_it_has_no_place_for_mass_unbalance(tmp_path: Path) -> 
     assert all("NOT IN THIS FILE: G: mass unbalance" in file.read_text() for file in done.files)
 
 
-def test_kalibr_refuses_another_frame_in_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("form", ["kalibr", "openvins"])
+def test_a_lower_triangular_form_refuses_another_frame_in_one_line(form: str, tmp_path: Path) -> None:
     made = result(*BASELINE)
     made.values[made.names.index("accel_misalignment_xy")] = 1e-3
-    with pytest.raises(DataError, match="accelerometer_triad"):
-        export("kalibr", tmp_path / "x.yaml", replace(made, body_frame="prior"), IMU)
+    with pytest.raises(DataError, match=f"{form}: .*accelerometer_triad"):
+        export(form, tmp_path / "x.yaml", replace(made, body_frame="prior"), IMU)
 
 
 def test_an_unknown_form_names_those_there_are(tmp_path: Path) -> None:

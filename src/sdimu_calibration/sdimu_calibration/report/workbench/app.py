@@ -12,20 +12,14 @@ from dash import State as Kept
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
-from sdimu_calibration.report.design.library import PRINT
-from sdimu_calibration.report.design.sheet import EARLY
-from sdimu_calibration.report.design.sheet import SCRIPT as DESIGN_SCRIPT
-from sdimu_calibration.report.design.sheet import STYLE as DESIGN_STYLE
 from sdimu_calibration.report.workbench import looking, showing, taking_home, together, view
-from sdimu_calibration.report.workbench.guard import LOOPBACK, guard, tell_error
+from sdimu_calibration.report.workbench.dash_page import application
+from sdimu_calibration.report.workbench.guard import LOOPBACK
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.steps import NOTHING, step
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
 
-_PAGE = """<!doctype html><html lang="en"><head>{%metas%}<title>{%title%}</title><script>EARLY</script>
-{%css%}<style>STYLE</style></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}
-<script>SCRIPT</script></footer></body></html>"""
 _BUTTONS = (
     "undo",
     "redo",
@@ -65,20 +59,9 @@ def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = 
     judge : callable, optional
         Diagnoses all recordings of the shelf as one set, with some effects added.
     """
-    app = Dash(
-        "sdimu workbench",
-        title="sdimu workbench",
-        update_title="",
-        serve_locally=True,
-        assets_ignore=".*",
-        on_error=tell_error,
-    )
-    guard(app.server, host)
-    page = _PAGE.replace("EARLY", EARLY).replace("STYLE", f"{DESIGN_STYLE}\n{view.STYLE}")
-    app.index_string = page.replace("SCRIPT", f"{DESIGN_SCRIPT}\n{PRINT}\n{view.SCRIPT}")
+    app = application("sdimu workbench", host, view.STYLE, view.SCRIPT)
     app.layout = lambda: view.layout("Workbench", judge is not None)
     doing = TaskProgress()
-    app.clientside_callback("function(_) { return window.benchLook(); }", Output("look", "data"), Input("page", "data"))
     _follow_clicks(app, shelf, doing)
     showing.register(app, shelf, doing)
     looking.register(app, shelf, doing)

@@ -1,4 +1,4 @@
-"""What the workbench answers: its own page on this machine, in requests of a page's size, and never with silence.
+"""What the pages that this machine serves answer: themselves, in requests of a page's size, and never with silence.
 
 A page of another site can reach a server on the loopback interface by a name that it lets point there (DNS rebinding).
 Its requests carry that name as Host: only names of this machine are answered.
@@ -45,7 +45,7 @@ def guard(server: Flask, host: str) -> None:
         origin = request.headers.get("Origin")
         asked = [f"//{request.headers.get('Host', '')}", *([origin] if origin else [])]
         if not all(_name(address) in names for address in asked):
-            abort(403, "The workbench answers this machine only.")
+            abort(403, "Only this machine is answered.")
 
     @server.after_request
     def keep_to_itself(response: Response) -> Response:

@@ -23,6 +23,11 @@
   // Components of Dash lack names, and hide elements that a keyboard still reaches: said and mended here.
   var NAMES = {shows: 'What is shown', which: 'Which stops', candidate: 'Candidate', channel: 'Channel', against: 'Against', added: 'Added effect', held: 'Stops left out', recording: 'Recording', coefficient: 'Coefficient'};
   function mend() {
+    // The button comes after the page has told its theme.
+    document.querySelectorAll('[data-switch-theme]').forEach(function (b) {
+      var words = window.sdimuTheme() === 'dark' ? 'Light page' : 'Dark page';
+      if (b.textContent !== words) { b.textContent = words; }
+    });
     document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
     document.querySelectorAll('.dash-radioitems').forEach(function (list) { list.setAttribute('role', 'radiogroup'); });
     document.querySelectorAll('.dash-radioitems label').forEach(function (label) { label.removeAttribute('role'); label.removeAttribute('aria-selected'); });

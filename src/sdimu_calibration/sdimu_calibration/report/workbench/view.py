@@ -10,8 +10,8 @@ from uuid import uuid4
 from dash import dcc, html
 
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
-from sdimu_calibration.report.design.library import CONFIG
 from sdimu_calibration.report.workbench.axes import STOP, TIME
+from sdimu_calibration.report.workbench.elements import card, graph
 
 TEMPLATE = """format: sdimu-effect/1
 name: my_effect
@@ -79,7 +79,7 @@ def layout(title: str, together: bool = False) -> Any:
                                     _own(),
                                     _home(),
                                     *([_set()] if together else []),
-                                    _card(
+                                    card(
                                         "Models of this page side by side",
                                         html.Div(id="models", className="scroll"),
                                         more="whole",
@@ -138,7 +138,7 @@ def _keys(keys: str) -> list[Any]:
 def _left() -> Any:
     return html.Div(
         [
-            _card(
+            card(
                 "Where does it fail? Click a cell",
                 html.Div(
                     [
@@ -153,9 +153,9 @@ def _left() -> Any:
                     ],
                     className="controls",
                 ),
-                _graph("heat", "Normalised mean of every channel at every stop"),
+                graph("heat", "Normalised mean of every channel at every stop"),
             ),
-            _card(
+            card(
                 "Residuals: click points, or draw a box",
                 html.Div(
                     [
@@ -178,7 +178,7 @@ def _left() -> Any:
                     ],
                     className="controls",
                 ),
-                _graph("residuals", "Residuals of the channel that is looked at"),
+                graph("residuals", "Residuals of the channel that is looked at"),
             ),
         ],
         className="column",
@@ -188,12 +188,12 @@ def _left() -> Any:
 def _middle() -> Any:
     return html.Div(
         [
-            _card(
+            card(
                 "What is missing? Click a bar",
                 dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
-                html.Div(_graph("ranking", "Score of every candidate"), id="candidates"),
+                html.Div(graph("ranking", "Score of every candidate"), id="candidates"),
             ),
-            _card("How far the error fell", _graph("ladder", "Held-out error of each model")),
+            card("How far the error fell", graph("ladder", "Held-out error of each model")),
         ],
         className="column",
     )
@@ -202,7 +202,7 @@ def _middle() -> Any:
 def _right() -> Any:
     return html.Div(
         [
-            _card("How probable each cause is", html.Div(id="odds")),
+            card("How probable each cause is", html.Div(id="odds")),
             html.Section(
                 [
                     html.H2("The candidate"),
@@ -246,7 +246,7 @@ def _right() -> Any:
 
 
 def _coefficients() -> Any:
-    return _card(
+    return card(
         "Coefficients",
         html.Div(
             [
@@ -307,17 +307,7 @@ def _set() -> Any:
     )
 
 
-def _card(title: str, *parts: Any, more: str = "") -> Any:
-    return html.Section([html.H2(title), *parts], className=f"card {more}".strip())
-
-
 def _picker(name: str, words: str, options: Sequence[Any], value: Any) -> Any:
     return html.Label(
         [words, dcc.Dropdown(id=name, options=list(options), value=value, clearable=False, className="pick")]
     )
-
-
-def _graph(name: str, words: str) -> Any:
-    # Plotly's own "responsive" would take the height of the container, which has none; the component follows the width.
-    config = {key: value for key, value in CONFIG.items() if key not in ("responsive", "modeBarButtonsToRemove")}
-    return html.Div(dcc.Graph(id=name, config=config), role="group", **{"aria-label": words})

@@ -11,22 +11,36 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.storage.export import autopilot, c_header, csv_table, imu_tk, kalibr, matrices, yaml_file
+from sdimu_calibration.storage.export import (
+    autopilot,
+    c_header,
+    csv_table,
+    imu_tk,
+    kalibr,
+    matrices,
+    noise_file,
+    openvins,
+    yaml_file,
+)
 from sdimu_calibration.storage.export.shared import Source
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 
 class Form(NamedTuple):
-    """A form: default file name, and the texts of its files by what is added to the name."""
+    """A form: default file name, the texts of its files by what is added to the name, whether noise is in it."""
 
     file_name: str
     write: Callable[[Source], dict[str, str]]
     cannot_hold: Callable[[LinearModel], list[str]]
+    has_noise: bool = False
 
 
 FORMS = {
     "matrices": Form("compensation.txt", matrices.texts, matrices.cannot_hold),
-    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, kalibr.cannot_hold),
+    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, kalibr.cannot_hold, True),
+    "kalibr-noise": Form("kalibr-imu.yaml", noise_file.kalibr_texts, noise_file.cannot_hold, True),
+    "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, openvins.cannot_hold, True),
+    "gtsam": Form("imu_metadata.txt", noise_file.gtsam_texts, noise_file.cannot_hold, True),
     "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
     "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),
     "yaml": Form("compensation.yaml", yaml_file.texts, yaml_file.cannot_hold),

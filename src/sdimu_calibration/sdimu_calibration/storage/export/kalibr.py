@@ -26,11 +26,7 @@ _TRIANGULAR = 1e-12
 def texts(source: Source) -> dict[str, str]:
     """Return the text of the file."""
     linear = source.linear
-    if np.abs(np.triu(linear.accel, 1)).max() > _TRIANGULAR:
-        raise DataError(
-            f"kalibr: the result is in body frame '{linear.body_frame}', Kalibr's model is that of the accelerometers "
-            "(calibrate with body_frame: accelerometer_triad)"
-        )
+    M_a = lower_only(linear, "kalibr", "Kalibr")
     M, C = lower_and_rotation(linear.gyro)
     # A acts on the force seen from the gyros: A C = G.
     A = linear.by_force @ C.T
@@ -40,24 +36,42 @@ def texts(source: Source) -> dict[str, str]:
         "# biases: 'bias' is added. Random walks are those of the IMU file; 0 is not known: set it before use.",
         "imu0:",
         "  model: scale-misalignment",
-        f"  accelerometer_noise_density: {number(source.imu.accel_white_noise)}  # m/s^2/sqrt(Hz)",
-        f"  accelerometer_random_walk: {_walk(source.imu.accel_random_walk)}  # m/s^3/sqrt(Hz)",
-        f"  gyroscope_noise_density: {number(source.imu.gyro_white_noise)}  # rad/s/sqrt(Hz)",
-        f"  gyroscope_random_walk: {_walk(source.imu.gyro_random_walk)}  # rad/s^2/sqrt(Hz)",
+        *(f"  {line}" for line in noise_lines(source)),
         "  rostopic: /imu/data_raw",
         "  time_offset: 0.0",
         f"  update_rate: {number(source.rate_hz)}",
-        *_block("  T_i_b", np.eye(4)),
+        *block("  T_i_b", np.eye(4)),
         "  accelerometers:",
-        *_block("    M", np.tril(linear.accel)),
+        *block("    M", M_a),
         f"    bias: {flow(linear.accel_bias)}  # m/s^2",
         "  gyroscopes:",
-        *_block("    M", M),
-        *_block("    A", A),
-        *_block("    C_gyro_i", C),
+        *block("    M", M),
+        *block("    A", A),
+        *block("    C_gyro_i", C),
         f"    bias: {flow(linear.gyro_bias)}  # rad/s",
     ]
     return {"": "\n".join(lines) + "\n"}
+
+
+def lower_only(linear: LinearModel, form: str, program: str) -> Floats:
+    """Return the matrix of the accelerometers, shape (3, 3), for a program that knows it lower triangular alone."""
+    if np.abs(np.triu(linear.accel, 1)).max() > _TRIANGULAR:
+        raise DataError(
+            f"{form}: the result is in body frame '{linear.body_frame}', {program}'s model is that of the "
+            "accelerometers (calibrate with body_frame: accelerometer_triad)"
+        )
+    return np.asarray(np.tril(linear.accel))
+
+
+def noise_lines(source: Source) -> list[str]:
+    """Lines of the four densities, by the names of Kalibr."""
+    imu = source.imu
+    return [
+        f"accelerometer_noise_density: {number(imu.accel_white_noise)}  # m/s^2/sqrt(Hz)",
+        f"accelerometer_random_walk: {_walk(imu.accel_random_walk)}  # m/s^3/sqrt(Hz)",
+        f"gyroscope_noise_density: {number(imu.gyro_white_noise)}  # rad/s/sqrt(Hz)",
+        f"gyroscope_random_walk: {_walk(imu.gyro_random_walk)}  # rad/s^2/sqrt(Hz)",
+    ]
 
 
 def _walk(value: float) -> str:
@@ -77,6 +91,7 @@ def cannot_hold(linear: LinearModel) -> list[str]:
     return bent(linear) + warm(linear)
 
 
-def _block(name: str, matrix: Floats) -> list[str]:
+def block(name: str, matrix: Floats) -> list[str]:
+    """Lines of a matrix under its name, a row each; the name is indented as it stands in the file."""
     indent = " " * (len(name) - len(name.lstrip()))
     return [f"{name}:", *(f"{indent}- {flow(values)}" for values in matrix)]

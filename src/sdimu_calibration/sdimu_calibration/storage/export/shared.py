@@ -29,8 +29,9 @@ class Source(NamedTuple):
 
 
 def number(value: float) -> str:
-    """Write a number so that reading it gives the same one."""
-    return repr(float(value))
+    """Write a number so that reading it gives the same one: YAML 1.1 takes ``3e-05`` for a text, ``3.0e-05`` not."""
+    whole, e, power = repr(float(value)).partition("e")
+    return f"{whole}{'' if '.' in whole or not e else '.0'}{e}{power}"
 
 
 def row(values: Floats) -> str:

@@ -1,0 +1,1 @@
+"""The live page: a test that runs, seen in the browser."""

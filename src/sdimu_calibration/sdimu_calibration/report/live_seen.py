@@ -1,0 +1,94 @@
+"""What is known of a test that runs: what is watched of it, what was known before, and where it is in words.
+
+`nodes.monitor.Progress` fills it; terminal and page show it and know no ROS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
+
+
+class Seen(Protocol):
+    """What is watched: `nodes.monitor.Progress`, of which this layer must not know."""
+
+    stop: int
+    phase: str
+    table_s: float
+    sigmas: dict[str, float]
+    first: dict[str, float]
+    nis: dict[str, float]
+    verdict: str
+    diagnosis: SeenDiagnosis
+
+
+class SeenTest(Seen, Protocol):
+    """The same with what came before: what a page draws over the test.
+
+    Attributes
+    ----------
+    filter_s : float
+        Data time that the filter has reached (s).
+    nis_by_stop : dict of int to dict of str to float
+        Mean squared innovation per degree of freedom, by stop and channel.
+    ladders : dict of int to tuple of (str, str)
+        Models and their errors, by the stop that the diagnosis is of.
+    choices : list of SeenChoice
+        Of a test that chooses its turns, the newest last.
+    """
+
+    filter_s: float
+    nis_by_stop: dict[int, dict[str, float]]
+    ladders: dict[int, Rows]
+    choices: list[SeenChoice]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What is known of a test before it runs.
+
+    Attributes
+    ----------
+    duration_s : float
+        0 where nobody knows.
+    stops : int
+        0 where nobody knows.
+    units : mapping of str to str
+        Customary unit by coefficient.
+    """
+
+    duration_s: float
+    stops: int
+    effects: Sequence[str]
+    units: Mapping[str, str]
+
+
+def place_words(test: Outline, seen: Seen) -> str:
+    """Say at which stop a test is, and whether it turns."""
+    of = f" of {test.stops - 1}" if test.stops else ""
+    return f"stop {seen.stop}{of} {seen.phase}"
+
+
+def time_words(test: Outline, seen: Seen) -> str:
+    """Say how far a test is, in seconds of its data."""
+    of = f" of {test.duration_s:.0f}" if test.duration_s else ""
+    return f"{seen.table_s:.0f}{of} s"
+
+
+def left_words(test: Outline, seen: Seen, wall_s: float) -> str:
+    """Say how long a test will take at the pace so far.
+
+    Parameters
+    ----------
+    wall_s : float
+        Wall time since the first sample (s).
+    """
+    if not test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
+        return "time left unknown"
+    pace = seen.table_s / wall_s
+    rest = max(0.0, test.duration_s - seen.table_s) / pace
+    words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
+    return f"{words} left at {pace:.3g} times real time"

@@ -1,0 +1,21 @@
+"""Elements that pages share: a card with its title, a figure with its words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dash import dcc, html
+
+from sdimu_calibration.report.design.library import CONFIG
+
+
+def card(title: str, *parts: Any, more: str = "") -> Any:
+    """Return a card; `more` are further classes."""
+    return html.Section([html.H2(title), *parts], className=f"card {more}".strip())
+
+
+def graph(name: str, words: str) -> Any:
+    """Return the place of a figure, with words for those who do not see it."""
+    # Plotly's own "responsive" would take the height of the container, which has none; the component follows the width.
+    config = {key: value for key, value in CONFIG.items() if key not in ("responsive", "modeBarButtonsToRemove")}
+    return html.Div(dcc.Graph(id=name, config=config), role="group", **{"aria-label": words})
