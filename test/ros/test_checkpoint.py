@@ -92,6 +92,9 @@ def test_another_test_in_the_same_folder_begins_anew(tmp_path, later_s):
     give(alone, other)
     np.testing.assert_array_equal(successor.finish().values, alone.finish().values)
     assert successor.finish().data == alone.finish().data
+    # The test before did not end: its samples are nowhere else.
+    assert any("of another test, which did not end" in note for note in successor.notes())
+    assert Journal(tmp_path / "j.1", digest("same")).before.samples == 1500
 
 
 def test_statuses_of_hours_before_another_test_do_not_pile_up(tmp_path, monkeypatch):

@@ -341,6 +341,25 @@ def hand(
 
 
 @app.command()
+def static(
+    out: Annotated[Path, typer.Option(help="Folder of runs and static.json.")] = Path("out/study-static"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Units of each IMU file and kind of set.")] = 20,
+    seed: Seed = 95_001,
+    kind: Annotated[list[str] | None, typer.Option(help="cube, 'up and down'; repeatable. All by default.")] = None,
+    imu: Imus = None,
+    workers: Workers = 2,
+) -> None:
+    """Calibrate and diagnose static recordings as one set: rests of a cube, up and down, noise with a memory."""
+    from sdimu_study.static import CASES, KINDS, STUDY
+
+    check_kinds(kind, KINDS)
+    wanted = imu_files(imu)
+    cases = {key: case for key, case in CASES.items() if key[0] in (kind or KINDS) and key[1] in wanted}
+    results = conduct(STUDY, cases, range(seed, seed + runs), out, workers)
+    leave(out / "static", results, STUDY.table(results, ("all",)))
+
+
+@app.command()
 def trembling(
     out: Annotated[Path, typer.Option(help="Folder of runs and trembling.json.")] = Path("out/study-trembling"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Runs of each IMU file.")] = 50,

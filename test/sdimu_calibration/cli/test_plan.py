@@ -19,6 +19,7 @@ from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.files.config import find_config, load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.model_choice import named_model
+from sdimu_calibration.storage.files.plan_file import write_plan
 from sdimu_calibration.storage.files.result_file import plain_origin, write_result
 from sdimu_calibration.storage.files.standing_file import KnownEntry, read_standing
 from sdimu_calibration.storage.opening import said_of, with_imu_file
@@ -57,6 +58,19 @@ def test_a_search_after_results_says_what_is_known_and_what_the_plan_adds(folder
     # Both classes are in the table, though the model of the command has neither.
     assert "gyro_scale_quadratic" in told
     assert load_plan(str(folder / "found.yaml")).duration_s <= load_plan("kim18").duration_s + 1e-6
+
+
+def test_a_plan_keeps_to_the_minutes_or_says_what_the_shortest_takes(folder, capsys):
+    plan(plan="kim18", after=[folder], minutes=20.0, tries=1, out=folder / "found.yaml")
+    assert load_plan(str(folder / "found.yaml")).duration_s <= 20.0 * 60.0
+    assert "the shortest takes" not in capsys.readouterr().out
+    whole = load_plan("kim18")
+    first = replace(whole, dwell_s=(40.0,) * 3, turns=(whole.turns[0], replace(whole.turns[0], axis="Z")))
+    write_plan(folder / "crossed.yaml", first, [])
+    plan(plan=str(folder / "crossed.yaml"), after=[folder], minutes=1.0, tries=1, out=folder / "short.yaml")
+    said = " ".join(capsys.readouterr().out.split())
+    minutes = load_plan(str(folder / "short.yaml")).duration_s / 60.0
+    assert f"fits in --minutes 1: the shortest takes {minutes:.1f} min" in said
 
 
 def test_the_shortest_recording_that_tells_them_apart_turns_at_another_rate(folder, capsys):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
+import warnings
 from dataclasses import replace
 from html import escape
 
+import numpy as np
 import pytest
 import yaml
 
@@ -52,6 +55,17 @@ def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
         "in use": use_section.figure(more.trials),
         "free inputs": residual_figures.free_inputs(data.free_inputs(diagnosis), two=True),
     }
+
+
+def test_a_channel_that_was_never_measured_leaves_its_panel_empty_without_a_warning(diagnosis):
+    """One rest and no turn: nothing says what the velocity was after one."""
+    found = data.residuals(diagnosis)
+    never = np.arange(12) < 6
+    gone = [np.where(never, np.nan, values) for values in (found.sigma, found.before, found.after)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = residual_figures.innovations(data.Residuals(found.t, found.stop, *gone), two=True)
+    assert "NaN" not in json.dumps(figure.layout, default=str)
 
 
 def test_the_verdict_stands_first(text, diagnosis):

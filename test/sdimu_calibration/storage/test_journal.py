@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.journal import Journal, Samples, Status, Temperature, digest
 
 OPTIONS = digest("site", "imu")
@@ -122,8 +125,60 @@ def test_a_damaged_record_ends_the_journal(tmp_path, kind):
     with path.open("r+b") as file:
         file.seek(place)
         file.write(kind)
-    assert Journal(path, OPTIONS).before == (7, 0, 0)
+    was = path.read_bytes()
+    again = Journal(path, OPTIONS)
+    assert again.before == (7, 0, 0)
     assert path.stat().st_size == place
+    # What stands behind the damage is whole, and nothing else has it.
+    assert again.set_aside == tmp_path / "j.1"
+    assert again.set_aside.read_bytes() == was
+    assert f"damaged after {place} bytes" in again.why_aside
+
+
+def test_a_torn_end_leaves_no_copy(tmp_path):
+    path = tmp_path / "j"
+    write(path).close()
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size - 4)
+    assert Journal(path, OPTIONS).set_aside is None
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def a_folder(place):
+    (place / "j").mkdir()
+    return place / "j"
+
+
+def a_pipe(place):
+    os.mkfifo(place / "j")
+    return place / "j"
+
+
+def below_a_file(place):
+    (place / "out").write_text("a file")
+    return place / "out" / "j"
+
+
+@pytest.mark.parametrize(
+    ("made", "lasting"), [(a_folder, True), (a_pipe, True), (below_a_file, True), (below_a_file, False)]
+)
+def test_a_place_that_takes_no_journal_is_told_with_the_way_out(tmp_path, made, lasting):
+    path = made(tmp_path)
+    with pytest.raises(DataError, match=rf"{path}: .*name another .*'out'"):
+        Journal(path, OPTIONS, lasting=lasting)
+
+
+def test_two_that_live_write_no_journal_together(tmp_path):
+    first = write(tmp_path / "j")
+    was = (tmp_path / "j").read_bytes()
+    with pytest.raises(DataError, match="another calibration node that lives"):
+        Journal(tmp_path / "j", OPTIONS)
+    with pytest.raises(DataError, match="another calibration node that lives"):
+        Journal(tmp_path / "j", digest("other options"))
+    assert (tmp_path / "j").read_bytes() == was
+    assert not (tmp_path / "j.1").exists()
+    first.close()
+    check(Journal(tmp_path / "j", OPTIONS).records(), 2)
 
 
 def test_a_journal_that_need_not_last_has_no_name(tmp_path):

@@ -23,7 +23,7 @@ from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 from sdimu_calibration.storage.bags.recover import recover
-from sdimu_calibration.storage.files.whole_file import same_file, write_whole, written_together
+from sdimu_calibration.storage.files.whole_file import put_aside, same_file, write_whole, written_together
 
 
 def names(folder):
@@ -251,3 +251,11 @@ def test_a_full_disk_is_told_with_the_file_that_was_to_be_written(tmp_path, monk
     assert ending.value.code == 1
     assert capsys.readouterr().err == f"sdimu: {tmp_path / 'result.json'}: No space left on device\n"
     assert names(tmp_path) == []
+
+
+def test_a_file_is_put_aside_where_nothing_else_is(tmp_path):
+    assert put_aside(tmp_path / "choices.json") is None
+    for number in (1, 2):
+        (tmp_path / "choices.json").write_text(f"test {number}")
+        assert put_aside(tmp_path / "choices.json") == tmp_path / f"choices.json.{number}"
+    assert [(tmp_path / name).read_text() for name in names(tmp_path)] == ["test 1", "test 2"]

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 _MOST_RATE, _MOST_ACCELERATION, _MOST_DWELL = 1e4, 1e6, 1e6
 """Fastest turn (deg/s), acceleration (deg/s^2) and longest stop (s) of a plan's file."""
 
+_ROUNDING_MIN = 1e-6
+"""Tolerance (min) of the time available: rounding of a sum."""
+
 
 @dataclass(frozen=True)
 class Planned:
@@ -196,6 +199,13 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
     print_table(console, *_table(start, known, first, found, limits), title)
     if before:
         tell_gain(console, start, found, before.open, (already(asked.question), first, found.bounds))
+    too_long = minutes is not None and found.minutes > minutes + _ROUNDING_MIN
+    if too_long:
+        say(
+            console,
+            f"no plan with the attitudes of {start.name} fits in --minutes {minutes:g}: the shortest takes "
+            f"{found.minutes:.1f} min (shorter --dwells, faster --rates, or a --plan with fewer stops)",
+        )
     if found.plan is start:
         say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
         answer(_content(start, known, first, found, limits, None), request.as_json)

@@ -37,6 +37,7 @@ from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.table_driver import Arrival
 from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_calibration.storage.files.json_file import write_json
+from sdimu_calibration.storage.files.whole_file import put_aside
 
 LATE_S = 1.5
 """Samples (s) that may still be on their way to the journal when a stop is looked at: an epoch and a block."""
@@ -59,6 +60,9 @@ class AdaptiveNode:
         model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
         added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files"))
         self._out = Path(declare.text("out", ".", "folder of the calibration node, with its journal"))
+        # The choices of another test, or of this one before its node was killed: no other file has them.
+        if aside := put_aside(self._out / CHOICES):
+            self.node.get_logger().warning(f"{self._out / CHOICES}: of an earlier test; kept as {aside}")
         self._goals, self._models, self._menu = goals, (added,), Menu()
         self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move, pictures=False))
         self._driving = Driving(self.node, self._act)

@@ -100,8 +100,7 @@ class CalibrationNode:
         beat_s = declare.number("heartbeat_s", 1.0, "wall time between heartbeats (s); 0: none", least=0.0)
         self._journal = Journal(self._out / JOURNAL, options, lasting=checkpoint)
         if aside := self._journal.set_aside:
-            text = f"{self._out / JOURNAL}: was of other options than this node's, which begins anew; kept as {aside}"
-            self.node.get_logger().warning(text)
+            self.node.get_logger().warning(f"{self._out / JOURNAL}: {self._journal.why_aside}; kept as {aside}")
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
         self._ended: float | None = None

@@ -121,8 +121,10 @@ class Feed:
         """Begin anew: what comes is of another test than the journal; what came since counts."""
         assert self._journal is not None
         raw, since = self._raw, self._since
+        aside = self._journal.copy_aside()
         self._journal.restart()
         Feed.__init__(self, self._make, self._journal)
+        self._live.notes.append(f"the journal was of another test, which did not end; kept as {aside}")
         self._raw = raw
         for action, arguments in since:
             action(*arguments)

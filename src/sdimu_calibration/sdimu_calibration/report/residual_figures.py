@@ -77,7 +77,12 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
 
 
 def _reach(normalised: Sequence[Floats], sigma: Floats, all_of_it: bool) -> float:
-    """Half the height of a panel: everything, or all but the first seconds, whose attitude is not known yet."""
+    """Half the height of a panel: everything, or all but the first seconds, whose attitude is not known yet.
+
+    One without a measurement (the velocity after a turn, where there is none) has any height.
+    """
+    if not np.isfinite(sigma).any():
+        return 1.0
     usual = 4.0 * float(np.nanmedian(sigma))
     if all_of_it:
         return 1.15 * max(usual, *(float(np.nanmax(np.abs(y * sigma))) for y in normalised))

@@ -9,7 +9,7 @@ import pytest
 
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_evidence import held_out, held_out_chance
-from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, prior_weight, with_reports
+from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set, with_reports
 from sdimu_calibration.report import first_screen
 from sdimu_calibration.storage.files.config import load_model
 from sdimu_calibration.storage.set_work import judged_outcome
@@ -27,7 +27,7 @@ def two() -> SetFit:
 
 def drawn(fit: SetFit, rng: np.random.Generator) -> SetFit:
     """The set with coefficients from their priors and noise drawn anew."""
-    values = rng.standard_normal(len(fit.names)) / np.sqrt(prior_weight(fit.reports, fit.names))
+    values = rng.standard_normal(len(fit.names)) / np.sqrt(fit.weight)
     truth = dict(zip(fit.names, values.tolist(), strict=True))
     reports = []
     for report in fit.reports:

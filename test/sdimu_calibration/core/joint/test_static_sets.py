@@ -11,9 +11,9 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.storage.files.config import load_model
+from sdimu_study.static_world import CUBE, GRADES, PAIR, beyond_prior, rests, truth
 
 from .conftest import here
-from .static_sets import CUBE, GRADES, PAIR, beyond_prior, rests, truth
 
 OPTIONS = SetOptions(load_model("baseline"))
 SEEDS = [pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4, 5)]

@@ -13,6 +13,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search import Goal, NextTurn, Question, next_turn, search
 from sdimu_calibration.core.plan_search.bound import bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
+from sdimu_calibration.core.plan_search.within import within
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
@@ -65,6 +66,26 @@ def test_a_shorter_plan_is_found_that_keeps_the_limits():
     told = bounds(found.plan, ASKED).largest()
     assert all(told[effect] <= limit * (1.0 + 1e-5) for effect, limit in limits.items())
     assert found.tried <= 6
+
+
+@pytest.mark.parametrize("minutes", [35.0, 20.0])
+def test_a_plan_keeps_to_the_time_given_however_few_are_tried(minutes):
+    found = search(KIM18, ASKED, ABLE, Goal({}, minutes), tries=1)
+    assert found.minutes <= minutes
+    # All of it is used that stops of one length can use.
+    assert found.minutes > 0.8 * minutes
+
+
+def test_a_plan_is_shortened_as_far_as_its_attitudes_allow():
+    slow = Abilities((math.radians(2.0),), math.radians(20.0), (100.0,))
+    crossed = replace(KIM18, dwell_s=(100.0,) * 3, turns=(KIM18.turns[0], replace(KIM18.turns[0], axis="Z")))
+    assert within(crossed, slow, 1.0) is crossed
+    quick = replace(slow, rates_rad_s=(math.radians(2.0), math.radians(10.0)), dwells_s=(20.0, 100.0))
+    assert within(crossed, quick, 1.0).duration_s == pytest.approx(60.0 + crossed.turns[0].duration_s * 0.4)
+    assert within(crossed, quick, 60.0) is crossed
+    # A turn that the table cannot run is no way to save time.
+    weak = replace(quick, acceleration_rad_s2=1e-5)
+    assert {turn.rate_rad_s for turn in within(crossed, weak, 1.0).turns} == {KIM18.turns[0].rate_rad_s}
 
 
 def test_in_a_given_time_the_worst_sigma_gets_smaller():

@@ -43,6 +43,10 @@ def test_names_of_this_machine_are_answered(server, host):
         "",
         "127.0.0.1@evil.example",
         "evil.example#127.0.0.1",
+        "evil.example@127.0.0.1",
+        "evil.example\\@127.0.0.1",
+        "127.0.0.1/evil.example",
+        "127.0.0.1:8050?evil.example",
     ],
 )
 @pytest.mark.parametrize("path", ["/", "/_dash-layout", "/_dash-dependencies"])
@@ -53,6 +57,9 @@ def test_other_names_are_refused_on_every_path(server, host, path):
 def test_a_page_of_another_site_is_refused(server):
     ask = {"Host": "127.0.0.1:8050", "Origin": "http://evil.example"}
     assert server.test_client().post("/_dash-update-component", headers=ask, json={}).status_code == 403
+    for origin in ("null", "http://evil.example@127.0.0.1:8050", "file://"):
+        ask["Origin"] = origin
+        assert server.test_client().post("/_dash-update-component", headers=ask, json={}).status_code == 403
     own = {"Host": "127.0.0.1:8050", "Origin": "http://127.0.0.1:8050"}
     assert server.test_client().get("/", headers=own).status_code == 200
 

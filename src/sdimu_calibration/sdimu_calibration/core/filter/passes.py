@@ -15,7 +15,7 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse_start
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.phases import restarts
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.filter.filter_pass import (
@@ -368,21 +368,36 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
     estimate, covariance : ndarray, shapes (p,) and (p, p)
         SI.
     """
-    sigma = np.sqrt(np.diag(covariance))
-    size = np.abs(estimate)
-    pull = size * sigma * sensors.weight
     gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
-    held = (size > _BEYOND * sensors.prior) & (pull > _PULL) & ~gauge & ~sensors.restated
+    held = held_back(sensors.weight, estimate, covariance) & ~gauge & ~sensors.restated
     if not held.any():
         return sensors
-    return replace(sensors, prior=np.where(held, _ROOM * size, sensors.prior))
+    return replace(sensors, prior=np.where(held, ROOM * np.abs(estimate), sensors.prior))
+
+
+def held_back(weight: Floats, estimate: Floats, covariance: Floats) -> Bools:
+    """Tell the coefficients that are far beyond their prior and that it holds back.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (p,)
+        Prior information (1/SI^2).
+    estimate, covariance : ndarray, shapes (p,) and (p, p)
+        SI.
+
+    Returns
+    -------
+    ndarray of bool, shape (p,)
+    """
+    size, sigma = np.abs(estimate), np.sqrt(np.diag(covariance))
+    return np.asarray((size * np.sqrt(weight) > _BEYOND) & (size * sigma * weight > _PULL))
 
 
 _BEYOND = 3.0
 """Size of an estimate (sigma of its prior) from which it contradicts the prior: chance ends there."""
 _PULL = 0.1
 """Shift of an estimate by its prior (sigma of the estimate) from which the passes are repeated: less is not seen."""
-_ROOM = 10.0
+ROOM = 10.0
 """New sigma of a contradicted prior, as a multiple of the estimate: it then says nothing."""
 MOST_WIDENINGS = 3
 """Number of times at most that priors are widened and the passes repeated: a widened prior holds nothing back, so a

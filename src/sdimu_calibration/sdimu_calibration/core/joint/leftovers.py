@@ -18,7 +18,7 @@ from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.combine import stacked
 from sdimu_calibration.core.joint.member import Job, Report
 from sdimu_calibration.core.joint.set_evidence import white_power_on
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, power_on, prior_weight, with_own
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, power_on, with_own
 from sdimu_calibration.core.recording import DataError
 
 ATTITUDE, TIME, TEMPERATURE = "attitude", "time", "temperature"
@@ -124,9 +124,8 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
         members += group
     every, P = stacked(rows), len(fit.names)
     W = np.hstack([every.A, _block_diagonal(own)])
-    weight = prior_weight(reports, fit.names)
     d = W.T @ every.y
-    left = Information(W.T @ W, d).given(np.arange(P), weight)
+    left = Information(W.T @ W, d).given(np.arange(P), fit.weight)
     order = [k for k in members if reports[k].places is not None]
     return _scaled(left.J[P:, P:], left.d[P:], [reports[k] for k in order], fit)
 

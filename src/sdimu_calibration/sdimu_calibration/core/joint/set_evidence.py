@@ -17,8 +17,9 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
+from sdimu_calibration.core.joint.joint_prior import prior_weight
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
-from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on, prior_weight
+from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
 from sdimu_calibration.core.probability import squares_tail
 
 MOST_FOLDS = 50
@@ -59,15 +60,14 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
     A, y = np.vstack([f.A for f in folds]), np.concatenate([f.y for f in folds])
     imu = fit.reports[0].imu
     _, prior = candidate_priors([c.effect for c in tried], imu)
-    weight = prior_weight(fit.reports, fit.names)
     return SetEvidence(
         e=y - A[:, :P] @ fit.estimate.values,
         W=A,
         stop=np.repeat(np.arange(len(folds)), [len(f.y) for f in folds]),
         names=names,
-        weight=weight,
+        weight=fit.weight,
         shift=-fit.estimate.values,
-        stated=1.0 / np.sqrt(weight),
+        stated=1.0 / np.sqrt(prior_weight(fit.reports, fit.names)),
         candidates=tuple(tried),
         prior=prior,
         imu=imu,

@@ -13,7 +13,9 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
+from sdimu_calibration.core.filter.passes import MOST_WIDENINGS
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
+from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.scope import by_name, split_tag
@@ -61,6 +63,8 @@ class SetFit:
         By start and samples, whatever the order in which they were named and their names: so are all digits.
     names : tuple of str, length P
         Coefficients of the estimator, then those of single recordings.
+    weight : ndarray, shape (P,)
+        Prior information of the coefficients (1/SI^2), of those that contradict their prior in the wider one.
     turn_on : tuple of TurnOn
         Empty with one power-on.
     left_out : tuple of (str, str)
@@ -76,6 +80,7 @@ class SetFit:
     reports: tuple[Report, ...]
     names: tuple[str, ...]
     estimate: JointEstimate
+    weight: Floats
     turn_on: tuple[TurnOn, ...]
     left_out: tuple[tuple[str, str], ...] = ()
     asked: tuple[str, ...] = ()
@@ -291,21 +296,6 @@ def joint_names(reports: Sequence[Report]) -> tuple[str, ...]:
     return (*shared, *(n for n in names if split_tag(n)[1]))
 
 
-def prior_weight(reports: Sequence[Report], names: Sequence[str]) -> Floats:
-    """Prior information of the coefficients: the least that a recording takes.
-
-    Returns
-    -------
-    ndarray, shape (P,)
-        1/SI^2.
-    """
-    least: dict[str, float] = {}
-    for report in reports:
-        for name, weight in zip(report.reduction.names, report.reduction.weight.tolist(), strict=True):
-            least[name] = min(weight, least.get(name, np.inf))
-    return np.array([least[name] for name in names])
-
-
 def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Effects of the model that differ from power-on to power-on, with their coefficients.
 
@@ -352,7 +342,7 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
     reports = in_order(reports)
     names = joint_names(reports)
     varying = varying_effects(options.model, options.scopes, names)
-    estimate, turn_on = _estimated(reports, names, varying)
+    estimate, weight, turn_on = _estimated(reports, names, varying)
     by_name = {m.name: m for m in members}
     return SetFit(
         tuple(by_name[r.name] for r in reports),
@@ -362,17 +352,33 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
         tuple(reports),
         names,
         estimate,
+        weight,
         turn_on,
         asked=tuple(by_name),
     )
 
 
 def _estimated(
-    reports: Sequence[Report], names: Sequence[str], varying: Mapping[str, tuple[str, ...]]
-) -> tuple[JointEstimate, tuple[TurnOn, ...]]:
+    reports: Sequence[Report], names: tuple[str, ...], varying: Mapping[str, tuple[str, ...]]
+) -> tuple[JointEstimate, Floats, tuple[TurnOn, ...]]:
+    """Estimate, prior information of the coefficients, and scatter of what differs from power-on to power-on."""
     groups = grouped_rows(reports, names)
     components = columns_of(varying, names) if len(groups) > 1 else []
-    combined = Combination(groups, prior_weight(reports, names), components)
+    weight = prior_weight(reports, names)
+    estimate, turn_on = _in_prior(groups, weight, components)
+    for _ in range(MOST_WIDENINGS):
+        wider = widened(weight, names, estimate.values, estimate.covariance)
+        if wider is weight:
+            break
+        weight = wider
+        estimate, turn_on = _in_prior(groups, weight, components)
+    return estimate, weight, turn_on
+
+
+def _in_prior(
+    groups: Sequence[Rows], weight: Floats, components: Sequence[Component]
+) -> tuple[JointEstimate, tuple[TurnOn, ...]]:
+    combined = Combination(groups, weight, components)
     turn_on = turn_on_scatter(combined)
     return in_scatter(combined, turn_on), turn_on
 
@@ -385,8 +391,8 @@ def with_reports(fit: SetFit, reports: Sequence[Report]) -> SetFit:
     reports : sequence of Report
         In the order of its own.
     """
-    estimate, turn_on = _estimated(reports, fit.names, fit.varying)
-    return replace(fit, reports=tuple(reports), estimate=estimate, turn_on=turn_on)
+    estimate, weight, turn_on = _estimated(reports, fit.names, fit.varying)
+    return replace(fit, reports=tuple(reports), estimate=estimate, weight=weight, turn_on=turn_on)
 
 
 def _moved(fit: SetFit, name: str) -> bool:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.effects.references import SITE_REFERENCES, told_of
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
 from sdimu_calibration.core.estimation.outcome import inseparable
+from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
@@ -57,7 +58,11 @@ def set_outcome(fit: SetFit) -> Calibration:
     # What the frame of the report pins differs in no recording.
     free = tuple(name for name, variance in zip(names, np.diag(covariance), strict=True) if variance > 0.0)
     at_site = conditioned(fit.estimate.covariance, np.array(places)) if places else fit.estimate.covariance
-    warnings = (*_warnings(fit, varied, free), *inseparable(names, _reported(fit, base, at_site)[1]))
+    warnings = (
+        *_warnings(fit, varied, free),
+        *_beyond(fit, base),
+        *inseparable(names, _reported(fit, base, at_site)[1]),
+    )
     sigma = np.sqrt(np.diag(fit.estimate.covariance))
     off = {fit.names[k]: (float(fit.estimate.values[k]), float(sigma[k])) for k in places}
     references = found(told_of(base.test.site, names), off)
@@ -187,6 +192,13 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
     ]
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
     return (*left_out, *_misfit(fit), *lines, *_told(fit, [r.warnings for r in fit.reports]))
+
+
+def _beyond(fit: SetFit, base: Fit) -> list[str]:
+    """Name the coefficient furthest outside the IMU's file, where one is."""
+    sensors = base.setup.sensors if isinstance(base, NavigationFit) else base.sensors
+    values = dict(zip(fit.names, fit.estimate.values.tolist(), strict=True))
+    return outside(sensors, np.array([values.get(name, 0.0) for name in sensors.names]))[:1]
 
 
 def _misfit(fit: SetFit) -> list[Note]:

@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.combine import spread_out
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import white_power_on
-from sdimu_calibration.core.joint.set_fit import SetFit, power_on, prior_weight
+from sdimu_calibration.core.joint.set_fit import SetFit, power_on
 from sdimu_calibration.core.probability import chi2_tail, normal_tail
 from sdimu_calibration.core.results import SetTrend
 
@@ -86,7 +86,7 @@ def _scores(fit: SetFit, p: int) -> _Scores:
     theta = fit.estimate.values
     K = len(fit.reports)
     d, X = np.zeros((K, p)), np.zeros((K, p, len(fit.names)))
-    J = np.diag(prior_weight(fit.reports, fit.names))
+    J = np.diag(fit.weight)
     within = np.zeros((p, K, K))
     for group in fit.power_ons:
         members = [k for k, r in enumerate(fit.reports) if power_on(r) == group]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
+from sdimu_calibration.core.plan_search.within import within
 from sdimu_calibration.core.recording import DataError
 
 _SLACK = 1e-6
@@ -71,12 +72,13 @@ def search(
     start : Plan
         Every change keeps the attitudes of its stops.
     tries : int
-        Most plans to evaluate (about half a second each).
+        Most plans to evaluate (about half a second each); one more where the start is longer than `minutes`.
 
     Returns
     -------
     Found
-        The start itself when no change improves it.
+        The start itself when no change improves it. In `minutes` where any change makes it fit, whatever `tries`;
+        else the shortest.
     """
     if not goal.limits and goal.minutes is None:
         raise DataError("a plan needs a goal: state limits, or the minutes available")
@@ -86,8 +88,12 @@ def search(
         there = ", ".join(first.largest())
         raise DataError(f"limit for '{unknown[0]}': not an effect of the model (there are: {there})")
     best = Found(start, first, _worst(first, goal), 1)
-    tried = 1
-    seen = {_key(start)}
+    fits = start if goal.minutes is None else within(start, able, goal.minutes)
+    if fits is not start:
+        told = bounds(fits, asked)
+        best = Found(fits, told, _worst(told, goal), 2)
+    tried = best.tried
+    seen = {_key(start), _key(fits)}
 
     def consider(plan: Plan) -> bool:
         """Evaluate a plan; True when it is the best so far."""

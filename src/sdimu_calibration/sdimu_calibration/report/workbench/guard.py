@@ -81,11 +81,17 @@ _LONGEST = 500
 
 
 def _name(address: str) -> str | None:
-    """Host in an address, in small letters; None where there is none."""
+    """Host in an address, in small letters; None where there is none, or more than a host and its port."""
     try:
-        return urlsplit(address).hostname
+        parts = urlsplit(address)
     except ValueError:
         return None
+    more = parts.path or parts.query or parts.fragment or _NO_HOST & set(parts.netloc)
+    return None if more else parts.hostname
+
+
+_NO_HOST = frozenset("@\\, ")
+"""Characters that no name of a host has: what reads beside them reads another host than we do."""
 
 
 def _own_names(host: str) -> list[str]:

@@ -11,15 +11,17 @@ before the end asks for it (`Journal.raw`).
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
-import itertools
 import json
 import os
+import shutil
 import struct
 import tempfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import RawTest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.journal_walk import Counts, raw_test, walk
+from sdimu_calibration.storage.files.whole_file import free_beside
 
 Stamps = Ints
 
@@ -40,6 +43,10 @@ _COLUMNS = 7
 """Doubles a sample: the stamp's bits, three rates, three forces."""
 _READ = 1 << 20
 """Bytes that are read at once."""
+_KINDS = (b"I", b"S", b"T")
+"""Kinds of records: samples, status, temperature."""
+_LONGEST_TORN = 1 << 16
+"""Bytes of a record that a kill can have cut off, at most: a node writes no more than a thousand samples at once."""
 _LONGEST_HEADER = 1000
 """Bytes within which the line at the head ends."""
 
@@ -95,34 +102,62 @@ class Journal:
     cut_bytes : int
         Bytes behind the last whole record of a predecessor, which are gone.
     set_aside : Path or None
-        Where the file now is that was in this place and is of other options.
+        Where the file now is that was in this place and is of other options, or its copy where records of it are
+        damaged and others stand behind them.
+    why_aside : str
+        Why it was set aside.
     """
 
     def __init__(self, path: Path, options: str, *, lasting: bool = True) -> None:
         self._path = path
         self._lasting = lasting
         self._header = json.dumps({"format": FORMAT, "options": options}).encode() + b"\n"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self.set_aside = self._put_aside() if lasting else None
-        # Unbuffered: a record is with the system when the call returns.
-        self._file = (
-            path.open("a+b", buffering=0) if lasting else tempfile.TemporaryFile("a+b", buffering=0, dir=path.parent)  # noqa: SIM115 (open as long as the node)
-        )
+        self.why_aside = "was of other options than this node's, which begins anew"
+        self.set_aside: Path | None = None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._opened()
+            if lasting and (aside := self._put_aside()):
+                self.set_aside = aside
+                self._file.close()
+                self._file = self._opened()
+        except OSError as error:
+            raise DataError(
+                f"{path}: the journal of the test cannot be written here ({error.strerror}); name another folder by "
+                "'out'"
+            ) from error
         self.before, self.cut_bytes = Counts(0, 0, 0), 0
         self._before_end = len(self._header)
         self._recall()
 
+    def _opened(self) -> FileIO:
+        """Open the file unbuffered: a record is with the system when the call returns."""
+        if not self._lasting:
+            return tempfile.TemporaryFile("a+b", buffering=0, dir=self._path.parent)
+        if self._path.exists() and not self._path.is_file():
+            raise DataError(
+                f"{self._path}: no file: the journal of the test stands there; move it, or name another 'out'"
+            )
+        file = self._path.open("a+b", buffering=0)
+        try:
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            # Records of two nodes would be one test.
+            file.close()
+            raise DataError(
+                f"{self._path}: another calibration node that lives writes it; end it, or name another folder by 'out'"
+            ) from error
+        except OSError:
+            # A file system without locks.
+            return file
+        return file
+
     def _put_aside(self) -> Path | None:
         """Rename what is of other options, to the first number that is free: it may be all that there is of a test."""
-        if not self._path.is_file():
-            return None
-        with self._path.open("rb") as file:
-            head = file.read(len(self._header) + 1)
+        head = os.pread(self._file.fileno(), len(self._header) + 1, 0)
         if len(head) <= len(self._header) or head.startswith(self._header):
             return None
-        names = (self._path.with_name(f"{self._path.name}.{number}") for number in itertools.count(1))
-        aside = next(name for name in names if not name.exists())
-        return self._path.rename(aside)
+        return self._path.rename(free_beside(self._path))
 
     def _recall(self) -> None:
         """Count what is there and cut off a torn end; a file that holds no records is begun."""
@@ -132,6 +167,9 @@ class Journal:
         content = self._content()
         self._before_end, self.before = walk(content, len(self._header))
         self.cut_bytes = len(content) - self._before_end
+        if self._lasting and not _torn(bytes(content[self._before_end : self._before_end + _LONGEST_TORN])):
+            self.set_aside = self.copy_aside()
+            self.why_aside = f"is damaged after {self._before_end} bytes, and this node goes on from there"
         del content
         self._file.truncate(self._before_end)
 
@@ -183,6 +221,12 @@ class Journal:
         """Keep a temperature."""
         self._append(b"T", _TEMPERATURE.pack(ns, value))
 
+    def copy_aside(self) -> Path:
+        """Copy all of it to the first number beside it that is free: it is of a test that nothing else has."""
+        aside = free_beside(self._path)
+        shutil.copyfile(self._path, aside)
+        return aside
+
     def restart(self) -> None:
         """Forget everything."""
         self._file.seek(0)
@@ -211,6 +255,14 @@ def read_journal(path: Path) -> RawTest:
     if not len(ends):
         raise DataError(f"{path}: no journal of a calibration")
     return raw_test(content, int(ends[0]) + 1)
+
+
+def _torn(rest: bytes) -> bool:
+    """Whether bytes behind the last whole record are the begin of one that a kill cut off, and no damaged ones."""
+    if len(rest) < _HEAD.size:
+        return True
+    kind, length, _ = _HEAD.unpack_from(rest)
+    return kind in _KINDS and len(rest) < min(_HEAD.size + length, _LONGEST_TORN)
 
 
 def _decoded(kind: bytes, content: bytes) -> Record:

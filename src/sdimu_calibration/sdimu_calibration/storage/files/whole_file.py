@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import itertools
 import os
 import secrets
 import shutil
@@ -37,6 +38,17 @@ def same_file(one: Path, other: Path) -> bool:
 def beside(path: Path) -> Path:
     """Name of a hidden file or folder beside `path` that nobody else takes, on the same file system."""
     return path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+
+
+def free_beside(path: Path) -> Path:
+    """Name beside `path` with the first number that is free: for what must not be lost when another takes its place."""
+    names = (path.with_name(f"{path.name}.{number}") for number in itertools.count(1))
+    return next(name for name in names if not name.exists())
+
+
+def put_aside(path: Path) -> Path | None:
+    """Rename a file by `free_beside`; None where there is none."""
+    return path.rename(free_beside(path)) if path.is_file() else None
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -49,6 +49,7 @@ class Opened:
     test: PreparedTest
 
     def __call__(self) -> PreparedTest:
+        """Open it."""
         return self.test
 
 
@@ -83,10 +84,11 @@ def beyond_prior(grade: str) -> tuple[str, ...]:
     return tuple(f"gyro_bias_{axis}" for axis in "xyz") if walk > imu.prior["gyro_bias"] else ()
 
 
-def _scenario(grade: str, seed: int, turns: Sequence[Turn]) -> Scenario:
+def _scenario(grade: str, seed: int, turns: Sequence[Turn], noise: Sequence[str] | None) -> Scenario:
     imu, dwell_s = load_imu(grade), _DWELL_S[grade]
     plan = Plan("cube", (dwell_s,) * (len(turns) + 1), tuple(turns), math.radians(20.0))
-    return Scenario(plan, imu, SITE, rate_hz=_RATE_HZ, seed=seed, noise=wander(imu, dwell_s))
+    told = wander(imu, dwell_s) if noise is None else tuple(noise)
+    return Scenario(plan, imu, SITE, rate_hz=_RATE_HZ, seed=seed, noise=told)
 
 
 def _kept(grade: str, turns: Sequence[Turn]) -> list[tuple[float, float]]:
@@ -96,19 +98,23 @@ def _kept(grade: str, turns: Sequence[Turn]) -> list[tuple[float, float]]:
     return [(t + _EDGE_S, t + dwell_s - _EDGE_S) for t in begin]
 
 
-def truth(grade: str, seed: int, turns: Sequence[Turn], frame: str) -> dict[str, float]:
+def truth(
+    grade: str, seed: int, turns: Sequence[Turn], frame: str, noise: Sequence[str] | None = None
+) -> dict[str, float]:
     """Coefficients of the unit (SI) in a body frame, biases in the mean over what is kept of the rests."""
-    scenario = _scenario(grade, seed, turns)
+    scenario = _scenario(grade, seed, turns, noise)
     unit, interval = imu_truth(scenario), 1.0 / _RATE_HZ
     ends = np.ravel(_kept(grade, turns))
     spans = PhaseLog(ends, np.arange(len(ends)) % 2 == 0, np.arange(len(ends)) // 2)
     t = interval * np.arange(1, round(ends[-1] / interval) + 1)
-    return in_body_frame(unit.coefficients | mean_bias(unit, t, spans, interval, seed), frame)
+    return in_body_frame({**unit.coefficients, **mean_bias(unit, t, spans, interval, seed)}, frame)
 
 
-def rests(grade: str, seed: int, turns: Sequence[Turn] = CUBE) -> tuple[Member, ...]:
-    """Static recordings of a unit: the rests between some turns."""
-    scenario = _scenario(grade, seed, turns)
+def rests(
+    grade: str, seed: int, turns: Sequence[Turn] = CUBE, noise: Sequence[str] | None = None
+) -> tuple[Member, ...]:
+    """Give static recordings of a unit: the rests between some turns; without `noise` in that of `wander`."""
+    scenario = _scenario(grade, seed, turns, noise)
     imu, whole = scenario.imu, simulate(scenario, imu_truth(scenario))
     parts = [cut(whole, begin, end, k) for k, (begin, end) in enumerate(_kept(grade, turns))]
     return tuple(
