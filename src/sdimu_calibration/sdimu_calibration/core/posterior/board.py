@@ -233,7 +233,8 @@ class Board(Generic[E]):
             return [(self.data(NoiseModel())[1].at(members).score, NoiseModel())]
         known, weight = self.parameters(members)
         information = self.joint.on_wander(known, weight)
-        alone = self.data(NoiseModel())[1].at(members).score
+        # A size that has the wrong sign in white noise may have the right one in another.
+        alone = self.data(NoiseModel())[1].at(members).of_any_sign
         found = explored(information, self.wander.cut, usual_sizes(self.evidence.imu), tried, max(rival - alone, 0.0))
         return [(alone + score, noise) for score, noise in found]
 

@@ -58,7 +58,9 @@ class Expansion:
     Attributes
     ----------
     score : float
-        Log posterior over that of the empty set in the same noise.
+        Log posterior over that of the empty set in the same noise; -inf of a model with a size of the wrong sign.
+    of_any_sign : float
+        The same, whatever the signs of the sizes.
     c, r : ndarray, shape (q,)
         Information on each candidate beside the model, and its pull.
     """
@@ -77,7 +79,7 @@ class Expansion:
         self.c = np.maximum(np.diag(J) - np.einsum("qk,qk->q", self._V, B), 0.0)
         self.r = d - B @ self._m
         log_det = float(np.linalg.slogdet(A)[1]) if members else 0.0
-        self.score = (
+        self.score = self.of_any_sign = (
             0.5 * float(d[self.columns] @ self._m)
             - 0.5 * (log_det - float(np.log(loading).sum()))
             + self._log_prior(members)

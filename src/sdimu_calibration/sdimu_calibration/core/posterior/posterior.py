@@ -249,9 +249,12 @@ def posterior(
     finer = {c for c in allowed.tolist() if labels.get(evidence.candidates[c - first].label, (0, False))[1]}
     board = Board(evidence, allowed, frozenset(finer), wander, earlier)
     number = {evidence.candidates[c - first].label: k for k, c in enumerate(board.use.tolist())}
-    starts = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
+    named = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
+    # About another point two of a start may be one, or a size have the other sign: that is no model any more.
+    starts = [one for one in dict.fromkeys(named) if np.isfinite(board.data(NoiseModel())[1].at(one).score)]
     tried = None if before is None else before.tried
-    noises, members, beside = _climbed(board, list(dict.fromkeys(starts)), tried, settled=before is not None)
+    settled = before is not None and len(starts) > 0
+    noises, members, beside = _climbed(board, starts or [()], tried, settled)
     asked: set[str] = set()
     sharpened = 0
     while sharpened < _MOST_SHARPENED:
@@ -338,12 +341,16 @@ def _climbed(
             for score, noise in asked[one]:
                 _add(known, score, noise, one)
                 best = max(best, score)
-        near = [found for found in known if found[0] > best - _HOPEFUL]
+        # Beside effects that are no model in that noise a noise may be better than all models: it counts no further.
+        hopeful = min(best, max(score for score, _, _ in known)) - _HOPEFUL
+        near = [found for found in known if found[0] >= hopeful]
         known = []
         for _, noise, one in sorted(near, key=lambda found: -found[0])[:_NOISES]:
             offset, data = board.data(noise)
             trials = [climb(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
             gain, found = max(trials, key=lambda t: t[0])
+            if not np.isfinite(gain):  # none of these is a model in that noise
+                gain, found = climb(data, (), of_two=False)
             known.append((offset + gain, noise, found))
         known.sort(key=lambda found: -found[0])
         offset, data = board.data(known[0][1])
