@@ -125,7 +125,7 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
     if not shown:
         return
     lines = [row for one in shown for row in candidate_rows(one, summary.diagnosis.probabilities)]
-    title = "found" if summary.candidates else "tried, but not enough to explain the misfit"
+    title = "found" if summary.candidates else "found, and not enough to explain what is left"
     print_table(console, CANDIDATE_HEADINGS, lines, title)
     for f in shown:
         alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike and len(f.may_be) < 2 else ""
@@ -174,11 +174,13 @@ def _possible(console: Console, summary: DiagnosisSummary) -> None:
     told = summary.diagnosis.probabilities
     if told is None:
         return
-    named = {share.name for f in summary.found for share in f.may_be}
+    named = {share.name for f in summary.found for share in f.may_be} | {f.candidate.label for f in summary.found}
     possible = [
         f"{one.members[0].label} {in_percent(one.probability)}"
         for one in told.families
-        if one.probability >= POSSIBLE and one.members and one.members[0].label.partition("(")[0] not in named
+        if one.probability >= POSSIBLE
+        and one.members
+        and not {one.members[0].label, one.members[0].label.partition("(")[0]} & named
     ]
     if possible:
         line(console, f"possible, and not told: {', '.join(possible[:_TOP])}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import socket
@@ -73,10 +74,15 @@ def check_port(host: str, port: int) -> None:
 
 def _is_taken(host: str, port: int) -> bool:
     with socket.socket() as probe:
+        # What a page that was closed leaves behind is no listener.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            return probe.connect_ex((host, port)) == 0
+            probe.bind((host, port))
         except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                return True
             raise DataError(f"--host {host}: {error.strerror or error}; name an address of this machine") from error
+        return False
 
 
 def _port(host: str, stated: int | None) -> int:

@@ -35,6 +35,10 @@ def raw_test(samples: Mapping[str, Any]) -> RawTest:
     -------
     RawTest
     """
+    if not hasattr(samples, "keys"):
+        raise DataError(
+            f"{ARRAYS}: {type(samples).__name__} has no columns by name; give t, gyro and accel in a mapping"
+        )
     given = {str(name): np.asarray(samples[name]) for name in samples}
     for name in given:
         if name not in _KNOWN:
@@ -58,7 +62,12 @@ def _stamps(given: Mapping[str, Any]) -> Ints:
         raise DataError(f"{ARRAYS}: no time: give t (s) or ns (integers)")
     t = _column(given, "t", len(given["t"]) if given["t"].ndim else 0)
     if not np.isfinite(t).all() or np.abs(t).max(initial=0.0) > _LONGEST_S:
-        raise DataError(f"{ARRAYS}: t is no time in seconds: stamps in ns are given as ns")
+        count = int(np.count_nonzero(~np.isfinite(t)))
+        raise DataError(
+            f"{ARRAYS}: {count} values of t are no numbers"
+            if count
+            else f"{ARRAYS}: t is no time in seconds: stamps in ns are given as ns"
+        )
     return np.asarray(np.rint(t * _NS), dtype=np.int64)
 
 
@@ -78,7 +87,9 @@ def _triad(given: Mapping[str, Any], triad: str, n: int) -> Floats:
 
 def _column(given: Mapping[str, Any], name: str, n: int) -> Floats:
     values = _numbers(given[name], name)
-    if values.shape != (n,) or not n:
+    if not n:
+        raise DataError(f"{ARRAYS}: {name} holds no samples")
+    if values.shape != (n,):
         raise DataError(f"{ARRAYS}: {name} has shape {values.shape}, expected ({n},) as the time has")
     return values
 

@@ -22,7 +22,8 @@ def test_a_coefficient_is_off_by_what_is_told_where_the_effect_is_there(bench, a
     without = bench.fit(effects=())
     with_it = bench.fit(effects=(f"{one.label}={size!r} {one.display_unit}",))
     k = without.sensors.names.index(name)
-    sigma = np.sqrt(np.diag(without.estimate_covariance))[k]
+    after = bench.diagnosis(effects=()).after
+    sigma = np.sqrt(np.diag(after.covariance))[after.names.index(name)]
     moved = abs(with_it.estimate[k] - without.estimate[k]) / sigma
     assert one.sigmas > 3.0
     # The same seed: the noise is the same in both.
@@ -33,3 +34,13 @@ def test_what_the_test_shows_well_is_not_taken_for_granted(assumed):
     # Misalignments of gyros show in turns of 90 deg, and nothing of the catalogue looks like them.
     assert not any(name.startswith("gyro_misalignment") for name in assumed)
     assert all(one.sigmas > 3.0 for one in assumed.values())
+
+
+def test_what_a_drift_that_is_told_may_be_instead_is_not_taken_for_granted(bench):
+    """A bias is its mean over the dwells, which drift it is moves it little; and the rivals are told with it."""
+    hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_warm_up_y(tau=300 s)=0.07 deg/h")
+    found = bench.diagnosis(12, hidden, "recommended")
+    rivals = {share.name for one in found.found_effects for share in one.may_be}
+    listed = {one.label.partition("(")[0] for one in assumed_absent(found)}
+    assert len(rivals) > 2
+    assert not rivals & listed

@@ -8,6 +8,7 @@ import numpy as np
 
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effects.imu_model import ImuModel
 
 BLOCK_EPOCHS = 20
@@ -36,6 +37,8 @@ class Layout:
 def layout(prepared: PreparedData) -> Layout:
     """Divide the used epochs into stops and blocks of at most `BLOCK_EPOCHS` epochs."""
     used = np.flatnonzero(prepared.phases.used)
+    if not len(used):
+        raise DataError("no second of the recording is a whole one at rest: is the unit of the stamps right?")
     starts = np.flatnonzero(np.diff(used, prepend=-2) != 1)
     ends = np.append(starts[1:], len(used))
     first, last = prepared.epochs.first, prepared.epochs.last

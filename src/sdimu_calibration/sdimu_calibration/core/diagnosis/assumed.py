@@ -46,33 +46,35 @@ class Assumed:
 
 
 def assumed_absent(d: Diagnosis) -> tuple[Assumed, ...]:
-    """Name for each coefficient the effect that would move it most, of those that are not in the model.
+    """Name for each coefficient the effect that would move it most, of those that are not told.
 
     With the model's information A, its signature b and its prior size s an effect has the size ``m +- v^(1/2)``, where
     ``v = 1/(c + s^-2)``, ``m = v r``; ``c, r`` are its information and pull beside the model. One unit of it moves the
-    coefficients by ``-A^-1 b``.
+    parameters of the model by ``-A^-1 b``. A bias is that in the mean over the dwells, whatever drifts the model has.
 
     Returns
     -------
     tuple of Assumed
-        One for each coefficient that is moved by more than three sigmas, the largest move first.
+        One for each coefficient that is moved by more than three of the sigmas that the diagnosis states, the largest
+        move first.
     """
     problem: Problem[LinearEvidence] = Problem(d.evidence)
     chosen = d.found.chosen.tolist()
     known, weight, _ = problem.known(chosen)
-    prior = d.evidence.prior
-    columns = [c for c in catalogue_columns(d).tolist() if c not in chosen and np.isfinite(prior[c - problem.p])]
+    columns, stated = _not_told(d), _stated_sigmas(d)
     if not columns:
         return ()
     J, right = d.evidence.information.J, d.evidence.information.d
-    A, B = J[np.ix_(known, known)] + np.diag(weight), J[np.ix_(known, columns)]
-    X = solved(A, np.column_stack([B, right[known], np.eye(len(known))]))
-    across, estimate, covariance = X[:, : len(columns)], X[:, len(columns)], X[:, len(columns) + 1 :]
+    A, B = J[np.ix_(known, known)] + np.diag(weight), J[known][:, columns]
+    X = solved(A, np.column_stack([B, right[known]]))
+    across, estimate = X[:, : len(columns)], X[:, len(columns)]
     information = np.maximum(np.diag(J)[columns] - np.einsum("ik,ik->k", B, across), 0.0)
-    variance = 1.0 / (information + prior[np.array(columns) - problem.p] ** -2.0)
+    prior = d.evidence.prior[np.array(columns) - problem.p]
+    variance = 1.0 / (information + prior**-2.0)
     size = np.sqrt(variance + (variance * (right[columns] - B.T @ estimate)) ** 2)
-    q = d.evidence.coefficients
-    moved = np.abs(_unit_moves(d, columns, across[:q])) * size / np.sqrt(np.diag(covariance)[:q, None])
+    # In the mean over the dwells: what the parameters give up, the drifts of the model with it, and its own.
+    parameters = np.column_stack([np.eye(len(stated), problem.p), _dwell_means(d, chosen)])
+    moved = np.abs(_dwell_means(d, columns) - parameters @ across) * size / stated[:, None]
     worst = np.argmax(moved, axis=1)
     out = []
     for row in np.argsort(-moved.max(axis=1)).tolist():
@@ -85,15 +87,30 @@ def assumed_absent(d: Diagnosis) -> tuple[Assumed, ...]:
     return tuple(out)
 
 
-def _unit_moves(d: Diagnosis, columns: list[int], across: Floats) -> Floats:
-    """Move of each of q coefficients per unit of each of k effects; a bias is that in the mean over the dwells.
+def _not_told(d: Diagnosis) -> list[int]:
+    """Columns of effects of a known size that are neither told nor what an effect that is told may be instead."""
+    chosen, p = set(d.found.chosen.tolist()), len(d.evidence.weight)
+    told = {label for one in d.found_effects for label in one.alike}
+    told |= {share.name for one in d.found_effects for share in one.may_be}
+    return [
+        c
+        for c in catalogue_columns(d).tolist()
+        if c not in chosen
+        and np.isfinite(d.evidence.prior[c - p])
+        and not {d.evidence.candidates[c - p].label, d.evidence.candidates[c - p].coefficient} & told
+    ]
 
-    Parameters
-    ----------
-    across : ndarray, shape (q, k)
-        What one unit of an effect takes off, were the coefficients constants.
-    """
-    out, p = -across, len(d.evidence.weight)
+
+def _stated_sigmas(d: Diagnosis) -> Floats:
+    """Sigmas of the q coefficients as the diagnosis states them (SI); inf of what is fixed."""
+    sigma = dict(zip(d.after.names, np.sqrt(np.diag(d.after.covariance)).tolist(), strict=True))
+    names = d.evidence.names[: d.evidence.coefficients]
+    return np.array([sigma.get(name, 0.0) or np.inf for name in names])
+
+
+def _dwell_means(d: Diagnosis, columns: list[int]) -> Floats:
+    """Mean over the dwells that one unit of each of k effects adds to each of q coefficients, shape (q, k)."""
+    out, p = np.zeros((d.evidence.coefficients, len(columns))), len(d.evidence.weight)
     rows = {name: row for row, name in enumerate(d.evidence.names[: d.evidence.coefficients])}
     for place, column in enumerate(columns):
         effect = d.evidence.candidates[column - p].effect

@@ -102,8 +102,10 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
         ground = next_ground(request, trial, done.chosen, own, done.found, ground.free)
     if done is None:
         raise AssertionError("a search has one round at least")
+    # Before the fit: its noise has the intervals that are stated here.
+    done = replace(done, found=replace(with_steps(done.found), stood=stood))
     fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
-    return replace(done, fit=fit, found=replace(with_steps(done.found), stood=stood))
+    return replace(done, fit=fit)
 
 
 def _first_ground(request: Request, progress: Progress) -> Ground:

@@ -87,7 +87,7 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
         return _consistent(d)
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
         nothing = f" (nothing is missing: {in_percent(d.probabilities.nothing)})" if d.probabilities else ""
-        return f"The noise model is wrong, the physics is not{nothing}: {'; '.join(d.noise)}."
+        return f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}."
     if d.verdict == Verdict.DATA_FAULT:
         faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
         return f"The data have a fault: {'; '.join(faults)}."
