@@ -84,7 +84,7 @@ def test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted
     wanted = replace(job, report=tmp_path)
     assert Diagnoser(wanted).answer(WorkerRequest(5, None, report=True)).unreported == ""
     found = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert any(EFFECT in candidate["effect"] for candidate in found["candidates"])
+    assert any(candidate["label"] == EFFECT for candidate in found["candidates"]), found["sentence"]
     assert "<html" in (tmp_path / "report.html").read_text()
     missing = replace(wanted, journal=tmp_path / "none")
     assert "journal" in Diagnoser(missing).answer(WorkerRequest(5, None, report=True)).unreported

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,11 @@ class Graded:
 
 def graded(found: Iterable[Found], told: Probabilities | None) -> tuple[Graded, ...]:
     """Grade what was found: by its class, or by its family where that is surer."""
-    return tuple(Graded(_sized(one), one.candidate.coefficient, size_of(one), *_grade(one, told)) for one in found)
+    every = tuple(found)
+    named = {one.candidate.coefficient for one in every}
+    return tuple(
+        Graded(_sized(one), one.candidate.coefficient, size_of(one), *_grade(one, told, named)) for one in every
+    )
 
 
 def in_grades(found: Sequence[Graded]) -> str:
@@ -75,8 +79,11 @@ def in_grades(found: Sequence[Graded]) -> str:
     return " ".join(told[:LISTED]) + (f" {more} more are in the table." if more > 0 else "")
 
 
-def _grade(one: Found, told: Probabilities | None) -> tuple[float, tuple[Share, ...]]:
-    """Probability that something of its class, or family, is missing; what that may be, the likeliest first."""
+def _grade(one: Found, told: Probabilities | None, named: Collection[str]) -> tuple[float, tuple[Share, ...]]:
+    """Probability that something of its class, or family, is missing; what that may be, the likeliest first.
+
+    `named` are the coefficients of all that was found: what stands beside it is not there instead of it.
+    """
     shares = tuple(share for share in one.may_be if share.probability >= NAMED)
     if not one.of_family > one.probability or told is None:
         return one.probability, shares
@@ -89,7 +96,8 @@ def _grade(one: Found, told: Probabilities | None) -> tuple[float, tuple[Share, 
     known = {share.name: share.probability for share in one.may_be}
     # Models may hold two time constants of one effect: where the class knows it, the sum counts them once.
     every = sorted(((known.get(name, min(p, 1.0)), name) for name, p in members.items()), key=lambda item: -item[0])
-    several = tuple(Share(name, p) for p, name in every if p >= NAMED)
+    beside = set(named) - {one.candidate.coefficient}
+    several = tuple(Share(name, p) for p, name in every if p >= NAMED and name not in beside)
     return one.of_family, several or shares
 
 
