@@ -105,7 +105,7 @@ def visit(browser: Any, workbench: Workbench) -> Iterator[Callable[[], Any]]:
         context = browser.new_context(viewport={"width": 1280, "height": 720}, accept_downloads=True)
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(60_000)
+        page.set_default_timeout(180_000)  # a machine that is busy takes its time
         page.on("console", lambda said: complaints.append(said.text) if said.type in {"error", "warning"} else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.goto(workbench.url)
