@@ -62,7 +62,7 @@ def server(record: LiveRecord) -> Iterator[Any]:
 def page(request: pytest.FixtureRequest, browser: Any, server: Any) -> Iterator[Any]:
     context = browser.new_context(viewport={"width": 1280, "height": 900}, color_scheme=request.param)
     shown = context.new_page()
-    shown.set_default_timeout(60_000)
+    shown.set_default_timeout(180_000)
     complaints: list[str] = []
     shown.on("pageerror", lambda error: complaints.append(str(error)))
     shown.goto(f"http://127.0.0.1:{server.port}/")

@@ -391,7 +391,7 @@ def test_a_server_that_ends_is_told_in_seconds_and_a_new_one_goes_on_where_the_p
     port = 1 + int(workbench.url.rstrip("/").rpartition(":")[2])
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(180_000)
     with serving(port, workbench.bag) as process:
         page.goto(f"http://127.0.0.1:{port}/")
         settle(page)
