@@ -123,7 +123,7 @@ def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected)
         ("imu", "gyro: 0.1 deg/h/sqrt(Hz)", "gyro: 0.1 deg/h", "noise.gyro: .*wrong unit"),
         ("imu", "1 deg/h,", "1 dog/h,", "prior.gyro_bias: unknown unit 'dog'"),
         ("imu", "1 deg/h,", "-1 deg/h,", "prior.gyro_bias: .*below zero"),
-        ("imu", "prior:", "priors:", r"priors: unknown key \(known keys: .*prior"),
+        ("imu", "prior:", "priors:", r"priors: unknown key; did you mean prior\? \(known keys: .*prior"),
         ("model", "velocity_sigma: 1 mm/s", "velocity_sigma: 1 mm", "velocity_sigma: .*wrong unit"),
         ("model", "[gyro_bias, accel_bias]", "[]", "effects: .*at least 1"),
         ("model", "accel_bias]", "gyro_bias]", "'gyro_bias' is there twice"),

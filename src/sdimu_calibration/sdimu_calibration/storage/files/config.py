@@ -11,6 +11,7 @@ import os
 import re
 import reprlib
 from collections.abc import Hashable, Mapping
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
@@ -261,7 +262,9 @@ def _rank(error: Any) -> int:
 def _message(error: Any, schema: type[BaseModel]) -> str:
     kind, found = error["type"], error.get("input")
     if kind == "extra_forbidden":
-        return f"unknown key (known keys: {', '.join(_known_keys(schema, error['loc'][:-1]))})"
+        known = _known_keys(schema, error["loc"][:-1])
+        near = get_close_matches(str(error["loc"][-1]), known, n=1)
+        return f"unknown key{f'; did you mean {near[0]}?' if near else ''} (known keys: {', '.join(known)})"
     if kind == "missing":
         return "missing key"
     if kind in _SHAPES:
