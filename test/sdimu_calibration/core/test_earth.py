@@ -48,6 +48,13 @@ def test_gradient_of_gravity_follows_from_curvature_by_bruns(lat_deg):
     assert slope == pytest.approx(bruns, rel=10.0 * earth.FLATTENING**2)
 
 
+def test_the_fall_of_gravity_slows_down_with_height_as_that_of_a_sphere():
+    # g ~ 1/(a + h)^2: the second derivative is 6 g/a^2, but for the flattening.
+    height, lat = 10e3, np.radians(45.0)
+    at = [earth.normal_gravity(lat, h) for h in (-height, 0.0, height)]
+    assert (at[0] - 2.0 * at[1] + at[2]) / height**2 == pytest.approx(6.0 * at[1] / earth.SEMI_MAJOR**2, rel=0.01)
+
+
 def test_earth_turns_once_in_a_sidereal_day():
     assert np.degrees(earth.RATE) * 3600.0 == pytest.approx(15.041067, abs=1e-6)
     assert 2 * np.pi / earth.RATE == pytest.approx(86164.1, abs=0.1)

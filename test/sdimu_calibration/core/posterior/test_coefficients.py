@@ -1,0 +1,29 @@
+"""Mean and covariance over all models are those of the mixture: the spread between models counts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core.posterior.coefficients import Averages
+
+
+def test_moments_over_all_models_are_those_of_the_mixture(bench):
+    hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_warm_up_y(tau=300 s)=0.07 deg/h")
+    diagnosis = bench.diagnosis(12, hidden, "recommended")
+    found = diagnosis.found.posterior
+    averages = Averages(found.board, diagnosis.fit.dwell_means)
+    told, models = averages.of(found), found.models[:400]
+    weight = np.array([m.probability for m in models])
+    weight /= weight.sum()
+    each = [averages.of_model(m.members, m.noise) for m in models]
+    mean = sum(w * one.mean for w, one in zip(weight, each, strict=True))
+    second = sum(w * (one.covariance + np.outer(one.mean, one.mean)) for w, one in zip(weight, each, strict=True))
+    scale = np.sqrt(np.diag(told.covariance))
+    scale[scale == 0.0] = 1.0
+    np.testing.assert_allclose((told.mean - mean) / scale, 0.0, atol=1e-9)
+    right = (second - np.outer(mean, mean)) / np.outer(scale, scale)
+    np.testing.assert_allclose(told.covariance / np.outer(scale, scale), right, atol=1e-6)
+    within = sum(w * np.diag(one.covariance) for w, one in zip(weight, each, strict=True))
+    # Which drift it is stays open, so that models differ.
+    assert (np.diag(told.covariance) / np.where(within > 0.0, within, 1.0)).max() > 1.1
+    assert weight.max() < 0.95
