@@ -11,15 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.coefficient_shifts import MATTERS
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import catalogue_columns
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-
-_MATTERS = 3.0
-"""Move of a coefficient (sigma) from which it is told: less is within what its sigma says."""
+from sdimu_calibration.core.posterior.coefficients import drift_mean
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ def assumed_absent(d: Diagnosis) -> tuple[Assumed, ...]:
     out = []
     for row in np.argsort(-moved.max(axis=1)).tolist():
         place = int(worst[row])
-        if moved[row, place] > _MATTERS:
+        if moved[row, place] > MATTERS:
             one = problem.candidate(columns[place])
             unit, shown = one.parameter.unit, one.parameter.display_unit
             own = (float(size[place]), unit, shown, float(moved[row, place]))
@@ -110,14 +108,6 @@ def _stated_sigmas(d: Diagnosis) -> Floats:
 
 def _dwell_means(d: Diagnosis, columns: list[int]) -> Floats:
     """Mean over the dwells that one unit of each of k effects adds to each of q coefficients, shape (q, k)."""
-    out, p = np.zeros((d.evidence.coefficients, len(columns))), len(d.evidence.weight)
-    rows = {name: row for row, name in enumerate(d.evidence.names[: d.evidence.coefficients])}
-    for place, column in enumerate(columns):
-        effect = d.evidence.candidates[column - p].effect
-        if not effect.bias_drift:
-            continue
-        for mean, term in zip(d.fit.dwell_means(effect).tolist(), effect.terms, strict=True):
-            name = bias.NAMES[term.channel]
-            if name in rows:
-                out[rows[name], place] += mean
-    return out
+    p, names = len(d.evidence.weight), d.evidence.names[: d.evidence.coefficients]
+    means = [drift_mean(d.evidence.candidates[c - p].effect, d.fit.dwell_means, names) for c in columns]
+    return np.array(means).reshape(-1, len(names)).T

@@ -11,7 +11,7 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.linear import E
 
-_MATTERS = 3.0
+MATTERS = 3.0
 """Difference of a coefficient (sigma) from which the choice matters: with less it is right enough whichever member it
 is."""
 
@@ -66,7 +66,7 @@ def coefficient_shifts(
         moved = (estimate - named)[:p] / sigma
         moved[_centred(problem, column, other)] = 0.0
         most = int(np.argmax(np.abs(moved)))
-        if abs(moved[most]) > _MATTERS:
+        if abs(moved[most]) > MATTERS:
             out.append(CoefficientShift(names[other], names[known[most]], float(moved[most])))
     return tuple(out)
 

@@ -103,8 +103,9 @@ class Board(Generic[E]):
     def excess_of(self, members: Members, noise: NoiseModel) -> float:
         """Variance of what a model leaves, over that of its noise (1); none below 1.
 
-        ``(e' S^-1 e - d' A^-1 d) / (N - k)``: S is the covariance of all noise, A and d the information on the k
-        parameters of the model.
+        ``(e' S^-1 e - d' A^-1 d) / (N - k)``: S is the covariance of all noise, A and d the information on coefficients
+        and the k effects of the model. What is known of a coefficient before the data makes up for its degree of
+        freedom.
         """
         evidence, one = self.evidence, self.as_stated.in_noise(noise)
         at = np.array([*range(len(evidence.weight)), *(len(evidence.weight) + k for k, _ in members)], dtype=np.int64)

@@ -8,7 +8,7 @@ wanders there. Source: J. Hoeting et al., "Bayesian model averaging: a tutorial"
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,7 +91,7 @@ class Averages:
             for other, column in rows.items():
                 own[row, column] = one.covariance[channel, other]
         for place, (number, _) in enumerate(members, start=p):
-            T[:, place] += self._shift(number, rows, q)
+            T[:, place] += self._shift(number)
         return Moments(T @ estimate + constant, T @ covariance @ T.T + own)
 
     def of(self, found: Posterior[E]) -> Moments:
@@ -106,17 +106,12 @@ class Averages:
         within = np.einsum("m,mij->ij", weight, np.array([one.covariance for one in each]))
         return Moments(mean, within + (weight[:, None] * apart).T @ apart)
 
-    def _shift(self, number: int, rows: dict[int, int], q: int) -> Floats:
-        """Mean over the dwells that a drift of a bias adds to it, per unit; shape (q,)."""
+    def _shift(self, number: int) -> Floats:
+        """Mean over the dwells that a candidate adds to each of q coefficients, per unit; shape (q,)."""
         if number not in self._means:
-            out = np.zeros(q)
-            first = len(self.board.evidence.weight)
-            effect = self.board.evidence.candidates[int(self.board.use[number]) - first].effect
-            if effect.bias_drift:
-                for mean, term in zip(self._dwell_means(effect).tolist(), effect.terms, strict=True):
-                    if term.channel in rows:
-                        out[rows[term.channel]] += mean
-            self._means[number] = out
+            evidence = self.board.evidence
+            effect = evidence.candidates[int(self.board.use[number]) - len(evidence.weight)].effect
+            self._means[number] = drift_mean(effect, self._dwell_means, evidence.names[: evidence.coefficients])
         return self._means[number]
 
     def _mean(self, noise: NoiseModel) -> _Mean:
@@ -130,3 +125,26 @@ class Averages:
                 G = np.einsum("s,scr->cr", share / share.sum(), one.R.reshape(len(cut), 6, -1))
                 self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
         return self._noises[noise]
+
+
+def drift_mean(effect: Effect, dwell_means: Callable[[Effect], Floats], names: Sequence[str]) -> Floats:
+    """Mean over the dwells that a drift of a bias adds to it, per unit of the drift.
+
+    Parameters
+    ----------
+    dwell_means : callable
+        As of `Averages`.
+    names : sequence of str, length q
+        Coefficients.
+
+    Returns
+    -------
+    ndarray, shape (q,)
+        SI; zero of all that is no bias, and of an effect that is no drift.
+    """
+    out = np.zeros(len(names))
+    if effect.bias_drift:
+        for mean, term in zip(dwell_means(effect).tolist(), effect.terms, strict=True):
+            if bias.NAMES[term.channel] in names:
+                out[names.index(bias.NAMES[term.channel])] += mean
+    return out
