@@ -133,14 +133,14 @@ def drift_mean(effect: Effect, dwell_means: Callable[[Effect], Floats], names: S
     Parameters
     ----------
     dwell_means : callable
-        As of `Averages`.
+        Mean of the regressors of an effect over all dwells (SI), shape (terms,).
     names : sequence of str, length q
         Coefficients.
 
     Returns
     -------
     ndarray, shape (q,)
-        SI; zero of all that is no bias, and of an effect that is no drift.
+        In the unit of the coefficient over that of the effect (SI); zero where it is no bias, and of no drift.
     """
     out = np.zeros(len(names))
     if effect.bias_drift:
