@@ -52,7 +52,10 @@ class Driver:
             assert time.monotonic() - begun < 120.0
             time.sleep(0.05)
 
-    def send(self, first_s: int, seconds: int, *, end: bool) -> None:
+    def tell_end(self, last_s: int) -> None:
+        self.end.publish(header(START + last_s * 10**9))
+
+    def send(self, first_s: int, seconds: int) -> None:
         rng = np.random.default_rng(first_s)
         count = seconds * RATE
         ns = START + first_s * 10**9 + (1 + np.arange(count, dtype=np.int64)) * (10**9 // RATE)
@@ -63,8 +66,6 @@ class Driver:
             self.status.publish(message)
         for message in messages:
             self.imu.publish(message)
-        if end:
-            self.end.publish(header(int(ns[-1])))
 
     def call(self, service: str) -> Trigger.Response:
         client = self.node.create_client(Trigger, f"/calibration/{service}")
@@ -100,17 +101,38 @@ def test_a_node_that_stays_takes_what_comes_after_an_end_and_begins_anew_on_requ
         driver.wait_for_listeners()
         journal = bench.folder / "calibration.journal"
         for first, expected in ((0, 4000), (40, 8000)):
-            driver.send(first, 40, end=True)
+            driver.send(first, 40)
+            driver.tell_end(first + 40)
             bench.wait(lambda expected=expected: samples_in(bench.folder) == expected, f"result of {expected}", 120.0)
             assert bench.children.running()
             assert journal.exists() == checkpoint
         assert driver.call("save").success
         assert samples_in(bench.folder) == 8000
         assert driver.call("reset").success
-        driver.send(0, 50, end=True)
+        driver.send(0, 50)
+        driver.tell_end(50)
         bench.wait(lambda: samples_in(bench.folder) == 5000, "result after the reset", 120.0)
         assert bench.children.running()
     finally:
         driver.close()
     assert bench.children.stop("calibration", 2) == 0
     assert not journal.exists()
+
+
+def test_samples_that_come_after_the_end_was_given_up_are_in_the_result(bench: FitSession) -> None:
+    """A packet that was lost is sent again seconds later, when the end has long been told on a topic of its own."""
+    stated = {"accel_unit": "m/s^2", "gyro_unit": "rad/s", "accel_sign": 1, "gyro_sign": 1}
+    bench.children.start(
+        "calibration", CALIBRATION, {"out": str(bench.folder), "stay": True, "diagnose": False} | stated
+    )
+    driver = Driver()
+    try:
+        driver.wait_for_listeners()
+        driver.send(0, 40)
+        driver.tell_end(60)
+        bench.wait(lambda: samples_in(bench.folder) == 4000, "result without the end", 120.0)
+        driver.send(40, 20)
+        bench.wait(lambda: samples_in(bench.folder) == 6000, "result with what came late", 120.0)
+        assert bench.children.running()
+    finally:
+        driver.close()

@@ -65,7 +65,8 @@ from sdimu_calibration.storage.files.whole_file import written_together
 
 JOURNAL = "calibration.journal"
 BLOCK = 20
-SETTLE_S = 2.0
+SETTLE_S = 5.0
+"""Time (s) after the end of the samples for which the last status is awaited: a lost packet is sent again after 3 s."""
 FAREWELL_S = 10.0
 CATCH_UP_S = 0.025
 """Time (s) between two ticks for a filter that is made anew: half of it, the other half is for samples."""

@@ -15,7 +15,7 @@ samples and then refuses. So consumers grant credits, and a simulated producer s
 Nothing here is needed to use a real driver: a consumer that never grants a credit never holds the
 producer, and a consumer without a crediting producer just listens. A consumer that vanished is
 forgotten when DDS has dropped it (the lease, 3 s with config/ros/fastdds.xml); one that stays idle at the same
-stamp for two seconds although more was sent has lost it, and is counted as being level.
+stamp for five seconds although more was sent has lost it, and is counted as being level.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ HISTORY = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durabil
 """The last thousand messages also reach who comes later; for slow topics."""
 
 REPEAT_S = 0.25
-STALE_REPEATS = 8
+QUIET_REPEATS = 20
+"""Number of repeated credits without data after which what was sent and has not come counts as lost: 5 s. A lost packet
+is sent again at the writer's next heartbeat, up to 3 s later. Repeats are counted, not seconds: a node that was busy or
+had no processor has not looked for data meanwhile."""
 REFUSED_S = 20.0
 NO_LIMIT = 2**63 - 1
 NS = 1_000_000_000
@@ -159,7 +162,7 @@ class Producer:
             peer = self._peers.setdefault(message.frame_id, _Peer(reached))
             peer.repeats = peer.repeats + 1 if reached == peer.reached_ns else 0
             peer.reached_ns = reached
-            if peer.repeats >= STALE_REPEATS and self._sent_ns is not None and reached < self._sent_ns:
+            if peer.repeats >= QUIET_REPEATS and self._sent_ns is not None and reached < self._sent_ns:
                 peer.reached_ns, peer.repeats = self._sent_ns, 0
         if self._on_credit is not None:
             self._on_credit()
@@ -204,7 +207,8 @@ class Consumer:
     busy : callable
         True while samples are waiting inside the consumer; credits are then not repeated.
     on_end : callable or None
-        Called when everything up to the end of a stream has been reached, once for each end.
+        Called when everything up to the end of a stream has been reached, once for each end; when some of it did not
+        come in time (`QUIET_REPEATS`), once without it, and again if it comes after all.
     """
 
     def __init__(
@@ -226,7 +230,7 @@ class Consumer:
         self._reached_ns = 0
         self._count = 0
         self._open = False
-        self._changed = time.monotonic()
+        self._quiet = 0
         self._end_ns: int | None = None
         self.ended = False
         self._publisher = node.create_publisher(Header, f"{topic}/credit", STREAM)
@@ -246,24 +250,36 @@ class Consumer:
 
     def reached(self, stamp_ns: int, samples: int = 1) -> None:
         """Everything up to `stamp_ns` has been dealt with; `samples` more than at the last call."""
+        # An end that was answered without these data is answered again.
+        self.ended = self.ended and not (samples and self._short)
         self._reached_ns = max(self._reached_ns, stamp_ns)
-        self._changed = time.monotonic()
+        self._quiet = 0
         self._count += samples
         if self._count >= self._every:
             self._grant()
         self._check_end()
 
+    @property
+    def _short(self) -> bool:
+        """Whether data before the end are missing."""
+        return self._end_ns is not None and self._reached_ns < self._end_ns
+
+    @property
+    def _gave_up(self) -> bool:
+        """Whether what is missing before the end has been awaited for long enough."""
+        return self._short and self._quiet >= QUIET_REPEATS
+
     def _grant(self) -> None:
         self._count = 0
         if self._open:
-            publish(self._publisher, header(self._reached_ns, self._name))
+            reached = self._end_ns if self._gave_up and self._end_ns is not None else self._reached_ns
+            publish(self._publisher, header(reached, self._name))
 
     def _repeat(self) -> None:
         if self._busy():
             return
-        # The end comes on another topic; data still on their way get two seconds to arrive.
-        if self._end_ns is not None and time.monotonic() - self._changed > 2.0:
-            self._reached_ns = max(self._reached_ns, self._end_ns)
+        # The end comes on another topic: data may still be on their way.
+        self._quiet += 1
         self._check_end()
         self._grant()
 
@@ -277,11 +293,11 @@ class Consumer:
         end_ns = to_ns(message.stamp)
         self.ended = self.ended and end_ns == self._end_ns
         self._end_ns = end_ns
-        self._changed = time.monotonic()
+        self._quiet = 0
         self._check_end()
 
     def _check_end(self) -> None:
-        if self.ended or self._end_ns is None or self._reached_ns < self._end_ns:
+        if self.ended or self._end_ns is None or (self._short and not self._gave_up):
             return
         self.ended = True
         self._grant()
