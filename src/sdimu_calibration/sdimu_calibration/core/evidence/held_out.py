@@ -7,11 +7,17 @@ uncertainty of the fit. In-sample chi-square falls with every parameter; this do
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+
+_LEAST_LEFT = 1e-6
+"""Share (1) of a row that its own fit must leave for the prediction without it to be worked out of that fit: below, a
+difference of nearly equal numbers has less than nine digits."""
 
 
 @dataclass(frozen=True)
@@ -47,30 +53,83 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         # Noise with a memory is predicted like a parameter of unit variance: what a stop shares with its neighbours.
         W, r = np.hstack([W, evidence.noise]), evidence.noise.shape[1]
         weight, shift = np.append(weight, np.ones(r)), np.append(shift, np.zeros(r))
-    J, d = W.T @ W, W.T @ e
-    unit = 1.0 / np.sqrt(np.diag(J) + weight)
+    normal = _Normal(W.T @ W, W.T @ e, weight, shift)
     stops = np.unique(evidence.stop)
     score = np.zeros(len(stops))
     total, count = 0.0, 0
     for k, stop in enumerate(stops):
         rows = evidence.stop == stop
-        Ws, es = W[rows], e[rows]
-        A = J - Ws.T @ Ws + np.diag(weight)
-        b = d - Ws.T @ es + weight * shift
-        inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
-        error = es - Ws @ (inverse @ b)
-        # log N(error; 0, I + Ws A^-1 Ws') by the matrix inversion lemma, in the size of the model.
-        root = np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
-        X = Ws @ root
-        M = np.eye(len(weight)) + X.T @ X
-        y = X.T @ error
-        chi2 = error @ error - y @ np.linalg.solve(M, y)
-        score[k] = -0.5 * (chi2 + np.linalg.slogdet(M)[1])
-        spread = 1.0 + np.sum(X**2, axis=1)
+        error, score[k], spread = normal.without(W[rows], e[rows])
         told = spread < evidence.unpredictable
         total += float(np.sum(error[told] ** 2 / spread[told]))
         count += int(told.sum())
     return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / max(count, 1))))
+
+
+@dataclass(frozen=True)
+class _Normal:
+    """Normal equations of k parameters on all rows, and what a part of the rows is predicted to be without it."""
+
+    J: Floats
+    d: Floats
+    weight: Floats
+    shift: Floats
+
+    @cached_property
+    def root(self) -> Floats:
+        """``R`` with ``R R' = (J + weight)^-1``, shape (k, k)."""
+        A = self.J + np.diag(self.weight)
+        unit = 1.0 / np.sqrt(np.diag(A))
+        L = np.linalg.cholesky(A * np.outer(unit, unit))
+        return np.asarray(solve_triangular(L, np.diag(unit), lower=True, check_finite=False).T)
+
+    def without(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
+        """Predict rows from all others.
+
+        Parameters
+        ----------
+        W : ndarray, shape (n, k)
+        e : ndarray, shape (n,)
+
+        Returns
+        -------
+        error : ndarray, shape (n,)
+        log_score : float
+        spread : ndarray, shape (n,)
+            Variance of each error.
+        """
+        told = self._by_rows(W, e) if len(e) < len(self.weight) else None
+        return self._by_parameters(W, e) if told is None else told
+
+    def _by_rows(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats] | None:
+        """Work in the number of rows, from the fit to all of them; None where hardly anything else tells of a row.
+
+        With H the part of the rows in their own fit, the error is ``(I - H)^-1`` times what the fit leaves, and its
+        covariance ``(I - H)^-1``. Source: R. D. Cook, S. Weisberg, "Residuals and influence in regression" (1982), 2.2.
+        """
+        X = W @ self.root
+        left, V = np.linalg.eigh(np.eye(len(e)) - X @ X.T)
+        if left[0] < _LEAST_LEFT:
+            return None
+        of_fit = V.T @ (e - X @ (self.root.T @ (self.d + self.weight * self.shift)))
+        log_score = -0.5 * float(np.sum(of_fit**2 / left) - np.sum(np.log(left)))
+        return V @ (of_fit / left), log_score, V**2 @ (1.0 / left)
+
+    def _by_parameters(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
+        """Work in the number of parameters, from the fit to the other rows.
+
+        The log of N(error; 0, I + W A^-1 W') by the matrix inversion lemma.
+        """
+        unit = 1.0 / np.sqrt(np.diag(self.J) + self.weight)
+        A = self.J - W.T @ W + np.diag(self.weight)
+        inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
+        error = e - W @ (inverse @ (self.d - W.T @ e + self.weight * self.shift))
+        root = np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
+        X = W @ root
+        M = np.eye(len(self.weight)) + X.T @ X
+        y = X.T @ error
+        chi2 = error @ error - y @ np.linalg.solve(M, y)
+        return error, -0.5 * float(chi2 + np.linalg.slogdet(M)[1]), 1.0 + np.sum(X**2, axis=1)
 
 
 def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:
