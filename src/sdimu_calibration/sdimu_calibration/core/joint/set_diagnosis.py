@@ -8,17 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, size
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
+from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.leftovers import leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
 from sdimu_calibration.core.joint.scope import tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance, own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, as_given, place_of, search_set
@@ -167,8 +169,8 @@ def _error_without(found: SetSearch) -> float | None:
 
 
 def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
-    values, sigma = found.after.estimate.values, np.sqrt(np.diag(found.after.estimate.covariance))
     names = list(found.after.names)
+    values, sigma = _differences(found.after)
     shared = [
         (
             *(c.label, c.effect.title, "", place_of(names, c), z, c.parameter),
@@ -182,7 +184,8 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         parameter = effect.parameters[0]
         called = (tagged(name, find.recording) for name in (find.key, parameter.name))
         place = next(names.index(name) for name in called if name in names)
-        own.append((find.key, effect.title, find.recording, place, find.z, parameter, (), find.probability))
+        title = f"{effect.title}, changed" if is_change(find.key) else effect.title
+        own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability))
     return tuple(
         SetFinding(
             *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
@@ -190,6 +193,19 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         )
         for label, title, recording, k, z, p, alike, probability in (*shared, *own)
     )
+
+
+def _differences(fit: SetFit) -> tuple[Floats, Floats]:
+    """Values and sigmas of a fit's coefficients (SI), those of one recording as differences from those of all others.
+
+    Returns
+    -------
+    values, sigma : ndarray, shape (P,)
+    """
+    T = np.eye(len(fit.names))
+    for own, shared in own_values(fit.names):
+        T[own, shared] = -1.0
+    return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
 
 
 def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> Verdict:
@@ -253,6 +269,8 @@ def _graded(f: SetFinding) -> Graded:
 
 
 def _named(f: SetFinding) -> str:
+    if f.recording and is_change(f.label):
+        return f"{named(f.label)} changed by {size(f.value, f.sigma, f.display_unit)} in {f.recording}"
     where = f" in {f.recording} alone" if f.recording else ""
     return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
 

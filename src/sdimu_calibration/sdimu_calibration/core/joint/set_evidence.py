@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_pri
 from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
+from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
 from sdimu_calibration.core.probability import squares_tail
 
@@ -60,13 +61,18 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
     A, y = np.vstack([f.A for f in folds]), np.concatenate([f.y for f in folds])
     imu = fit.reports[0].imu
     _, prior = candidate_priors([c.effect for c in tried], imu)
+    e, values = y - A[:, :P] @ fit.estimate.values, fit.estimate.values.copy()
+    for own, shared in own_values(fit.names):
+        # The value of one recording as its difference from that of the others: without it theirs holds there too.
+        A[:, shared] += A[:, own]
+        values[own] -= values[shared]
     return SetEvidence(
-        e=y - A[:, :P] @ fit.estimate.values,
+        e=e,
         W=A,
         stop=np.repeat(np.arange(len(folds)), [len(f.y) for f in folds]),
         names=names,
         weight=fit.weight,
-        shift=-fit.estimate.values,
+        shift=-values,
         stated=1.0 / np.sqrt(prior_weight(fit.reports, fit.names)),
         candidates=tuple(tried),
         prior=prior,
@@ -74,6 +80,19 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
         times=fit.reports[0].times,
         coefficients=P,
     )
+
+
+def own_values(names: Sequence[str]) -> list[tuple[int, int]]:
+    """Places of coefficients that one recording has for itself, each with the place of that of all others.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Coefficients of a set.
+    """
+    place = {name: k for k, name in enumerate(names)}
+    parts = [(k, *split_tag(name)) for name, k in place.items()]
+    return [(k, place[name]) for k, name, recording in parts if recording and name in place]
 
 
 def _folds(fit: SetFit) -> list[list[list[int]]]:

@@ -1,7 +1,8 @@
 """What does the model of a set miss? The search of one recording, on the evidence of all of them.
 
-An effect that is the same in all recordings, a fault of the data of one, a drift of one power-on: each is a candidate,
-and all are weighed in one posterior. What was chosen is a candidate again in the next round, about the fit that has it.
+An effect that is the same in all recordings, a fault of the data of one, a drift of one power-on, a coefficient that is
+another one in one recording: each is a candidate, and all are weighed in one posterior. What was chosen is a candidate
+again in the next round, about the fit that has it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.known import Standing
+from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
@@ -203,7 +205,10 @@ def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run
     effects = _candidates(fit, extra, finer)
     full = _gathered(fit, effects, run)
     local = [_of_one(label) for report in full.reports for label in report.reduction.labels if split_tag(label)[1]]
-    return set_evidence(full, [c for effect in effects for c in split(effect)], local)
+    reports, labels = with_changes(full.reports, stable_effects(full.model, full.varying))
+    changes = [change_of(label, reports[0].imu) for label in labels]
+    shared = [c for effect in effects for c in split(effect)]
+    return set_evidence(replace(full, reports=tuple(reports)), shared, [*local, *changes])
 
 
 def _of_one(label: str) -> Candidate:
