@@ -21,6 +21,8 @@ from sdimu_study.worlds import simulated_test
 class Ideal:
     """Evidence of a sensor that measures the mean of each second with white noise of one: 1200 s at rest."""
 
+    inner = row_times = None
+
     def __init__(self) -> None:
         self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
 

@@ -48,6 +48,10 @@ class Request:
     wander: Wander | None = None
     without: frozenset[str] = frozenset()
 
+    def in_inner(self, evidence: LinearEvidence) -> LinearEvidence:
+        """Return an evidence of white noise in what moves within the stretches of the test."""
+        return evidence if self.wander is None else evidence.in_inner(self.wander.inner)
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -86,7 +90,7 @@ def fresh_ground(request: Request, fit: Fit, tried: Sequence[Candidate], own: bo
     """
     base = request.base
     free = free_inputs(base.timetable) if base.free_inputs_testable else []
-    evidence = fit.evidence([*candidates(request, tried, own), *free])
+    evidence = request.in_inner(fit.evidence([*candidates(request, tried, own), *free]))
     evidence = evidence.as_candidates(fit.added_columns(len(tried)), tried)
     count = len(evidence.names)
     return Ground(fit, tuple(tried), evidence, np.arange(count - sum(len(e.parameters) for e in free), count))
@@ -109,7 +113,7 @@ def next_ground(
     if request.base.learns_scatter:
         return fresh_ground(request, fit, tried, own)
     before = found.evidence if found.white is None else found.white
-    evidence = before.about(fit.bare, fit.added_columns(len(tried)), tried)
+    evidence = before.about(request.in_inner(fit.bare), fit.added_columns(len(tried)), tried)
     if own and not any(c.family == "own" for c in evidence.candidates):
         more = _untried(candidates(request, (), own), frozenset(evidence.names))
         evidence = _without_doubles(evidence, more)

@@ -66,7 +66,8 @@ def noise_of(fit: Fit) -> FoundNoise:
     """Learn the noise of a fit where its innovations contradict white noise."""
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return FoundNoise()
-    evidence, wander = fit.bare, fit.wander
+    wander = fit.wander
+    evidence = fit.bare.in_inner(wander.inner)
     terms = wander.learned
     if terms is None:
         terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
@@ -93,6 +94,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     """
     if not isinstance(fit, NavigationFit):
         return fit
+    evidence = evidence.in_inner(wander.inner)
     if not terms:
         return fit.with_noise(None)
     bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)

@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
@@ -86,11 +87,14 @@ class Wander:
         Signatures; column ``6 stretch + channel``.
     learned : tuple of NoiseTerm or None
         Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked.
+    inner : InnerNoise or None
+        In which U is whitened, and an evidence must be that goes with it.
     """
 
     cut: Stretches
     U: Floats
     learned: tuple[NoiseTerm, ...] | None = None
+    inner: InnerNoise | None = None
 
     @cached_property
     def square(self) -> Floats:
@@ -144,7 +148,7 @@ class Wander:
         """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
         cut = stretches(evidence.times, share)
         cut = replace(cut, conditions=evidence.conditions(cut))
-        return cls(cut, evidence.constant_signature(cut))
+        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner)
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         """Work out independent modes of noise, those of which the data say nothing as a covariance of the means."""

@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -59,6 +60,8 @@ class LinearEvidence(ABC):
         How many of the model's parameters, the first ones, are sensor coefficients.
     noise : ndarray, shape (N, r)
         Signatures of the modes of noise with a memory.
+    inner : InnerNoise or None
+        Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there.
     worked_out : Information or None
         `information`, where whoever makes the evidence knows it more cheaply; evidence made from this one has its own.
     """
@@ -76,6 +79,7 @@ class LinearEvidence(ABC):
     times: Timetable
     coefficients: int
     noise: Floats = field(default_factory=lambda: np.zeros((0, 0)), kw_only=True)
+    inner: InnerNoise | None = field(default=None, kw_only=True)
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
 
     def __post_init__(self, worked_out: Information | None) -> None:
@@ -92,6 +96,17 @@ class LinearEvidence(ABC):
         ndarray, shape (N, parameters)
             Change of each whitened residual per SI unit of each parameter, effect by effect.
         """
+
+    @property
+    def row_times(self) -> Floats | None:
+        """Time at the end of what each row measures (s), shape (N,); None where rows have none."""
+        return None
+
+    def in_inner(self: E, inner: InnerNoise | None) -> E:
+        """Return an evidence of white noise whitened in noise that moves within stretches."""
+        if inner is None or self.inner is inner:
+            return self
+        return replace(self, e=inner.whitened(self.e), W=inner.whitened(self.W), inner=inner)
 
     def conditions(self, cut: Stretches) -> Conditions | None:
         """Give what an unknown error may follow in each stretch; None where nobody knows it."""

@@ -95,11 +95,19 @@ class NavigationEvidence(LinearEvidence):
 
     def signature(self, effects: Sequence[Effect]) -> Floats:
         """Signatures of all parameters of some effects."""
-        return columns(self.prepared, self.known, self.latitude, effects)
+        return self._whitened(columns(self.prepared, self.known, self.latitude, effects))
 
     def constant_signature(self, cut: Stretches) -> Floats:
         """Signatures of a constant error of each sensor axis in each stretch."""
-        return constant_columns(self.prepared, self.known, self.latitude, cut)
+        return self._whitened(constant_columns(self.prepared, self.known, self.latitude, cut))
+
+    def _whitened(self, W: Floats) -> Floats:
+        return W if self.inner is None else self.inner.whitened(W)
+
+    @property
+    def row_times(self) -> Floats:
+        """Time at the end of the epoch of each row (s), shape (N,)."""
+        return np.asarray(self.prepared.epochs.end[self.epoch])
 
     def conditions(self, cut: Stretches) -> Conditions:
         """Give what an unknown error may follow in each stretch."""

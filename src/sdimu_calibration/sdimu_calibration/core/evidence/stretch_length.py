@@ -2,7 +2,8 @@
 
 A bias that moves within a stretch as much as its white noise does is not described by its mean: the search then names
 steps and sines for what moves within, and the sigmas are too small. There stretches are halved, once: a quarter of the
-length takes three times as long.
+length takes three times as long. Where a bias moves that much in half a stretch, too, all rows are whitened in what
+moves within (`inner_noise`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.inner_noise import inner_noise
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander, learn
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -58,7 +60,14 @@ def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
 
 
 def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
-    return wander if moves_within(wander, terms) < _MOVES else Wander.of(evidence, 0.5)
+    if moves_within(wander, terms) < _MOVES:
+        return wander
+    half = Wander.of(evidence, 0.5)
+    t = evidence.row_times
+    if t is None or moves_within(half, terms) < _MOVES:
+        return half
+    inner = inner_noise(t, evidence.signature, half.cut, terms)
+    return replace(half, U=inner.whitened(half.U), inner=inner)
 
 
 def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:

@@ -145,7 +145,9 @@ def whitened(columns: Floats, evidence: LinearEvidence, terms: tuple[NoiseTerm, 
     """
     if not terms:
         return columns
-    return unit_noise(wander_in(evidence, terms).modes(terms).columns, columns)
+    wander = wander_in(evidence, terms)
+    inner = columns if wander.inner is None else wander.inner.whitened(columns)
+    return unit_noise(wander.modes(terms).columns, inner)
 
 
 def unit_noise(modes: Floats, columns: Floats) -> Floats:

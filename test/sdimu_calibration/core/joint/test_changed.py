@@ -1,0 +1,47 @@
+"""A coefficient that one recording of a set has for itself: the unit changed before it or in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_evidence import set_evidence
+from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
+from sdimu_calibration.core.joint.set_result import set_outcome
+
+from .conftest import here, short, unit_set
+
+
+@pytest.mark.parametrize(("name", "size"), [("accel_scale_x", 40e-6), ("gyro_misalignment_xy", 2e-5)])
+def test_a_coefficient_that_changed_is_told_as_such_and_not_as_physics_that_looks_like_it(options, name, size):
+    some = unit_set(37, [short()] * 3, shift={2: {name: size}})
+    found = diagnose_set(some.members, options, here)
+    assert [(f.label, f.recording) for f in found.findings] == [(name, "r2")]
+    (told,) = found.findings
+    assert told.probability > 0.99
+    assert told.value == pytest.approx(size, abs=4.0 * told.sigma)
+    assert told.title.endswith(", changed")
+    assert "changed by" in found.sentence
+    assert "in r2" in found.sentence
+    # The value of the unit is that of the other two.
+    others = set_outcome(fit_set(some.members[:2], options, here))
+    place = others.names.index(name)
+    sigma = float(np.sqrt(others.covariance[place, place]))
+    assert found.after.values[found.after.names.index(name)] == pytest.approx(others.values[place], abs=sigma)
+
+
+def test_the_value_of_one_recording_stands_in_the_evidence_as_its_difference(options):
+    some = unit_set(37, [short()] * 3, shift={2: {"accel_scale_x": 40e-6}})
+    fit = fit_set(some.members, SetOptions(options.model, local={"r2": ("accel_scale_x",)}), here)
+    evidence = set_evidence(fit, ())
+    own, shared = (fit.names.index(n) for n in ("accel_scale_x@r2", "accel_scale_x"))
+    difference = float(fit.estimate.values[own] - fit.estimate.values[shared])
+    assert -evidence.shift[own] == pytest.approx(difference)
+    assert difference == pytest.approx(40e-6, rel=0.2)
+    # A change of the unit's value moves the rows of all three recordings, that of the difference those of one.
+    moved = [
+        len(np.unique(evidence.stop[np.abs(evidence.W[:, k]) > 1e-6 * np.abs(evidence.W[:, k]).max()]))
+        for k in (own, shared)
+    ]
+    assert moved == [1, 3]
