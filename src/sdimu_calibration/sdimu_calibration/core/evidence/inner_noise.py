@@ -27,10 +27,10 @@ from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
 from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, TRIADS, NoiseTerm
 from sdimu_calibration.core.side_by_side import side_by_side
 
-_COSINES = 8
-"""Number of cosines of a stretch: the variance of flicker falls with 1/k, beyond the eighth to a tenth of that of the
+_COSINES = 16
+"""Number of cosines of a stretch: the variance of flicker falls with 1/k, beyond the sixteenth to a twentieth of the
 first."""
-_PIECES = 64
+_PIECES = 128
 """Number of pieces of a stretch over which cosines are integrated: eight for each wave of the fastest."""
 _MOVING = (RANDOM_WALK, FLICKER, MARKOV)
 """Kinds of noise that move within a stretch."""
