@@ -8,12 +8,12 @@ samples decide (`early_reading`), without a status the rests so far (`GrowingDwe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds, set_up
+from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import RawTest, in_order
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
@@ -24,19 +24,18 @@ from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.imu_model import with_references
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.filter.filter_pass import NAV, PassInput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.filter_pass import PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import pass_settings, start_state
 from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
+from sdimu_calibration.core.live_model import live_model
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
 from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S, motion
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
-from sdimu_calibration.core.specification import EPOCH_S, Model
+from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 
 NS = 1_000_000_000
@@ -110,10 +109,9 @@ class LiveCalibration:
 
     def __init__(self, options: OpeningOptions, model: Model) -> None:
         self.options = options
-        asked = set_up(options.site, options.imu, model, EPOCH_S)
-        self._asked = asked.sensors
-        self.setup = replace(asked, sensors=with_references(asked.sensors, stated_references(options.site)))
-        self.notes: list[str] = []
+        self._model = live_model(options, model)
+        self.setup = self._model.setup
+        self.notes = self._model.notes
         """What the caller should publish, such as what the filter waits for; the caller empties the list."""
         self._intake = Intake()
         self._kept: KeptTest | None = KeptTest()
@@ -133,10 +131,11 @@ class LiveCalibration:
         self._track = np.eye(3)
         self._before: Motion | None = None
         self._settings = pass_settings(self.setup, closed_loop=True)
-        self._J = body_frame.frame_jacobian(self._asked.names, model.body_frame)
+        self._J = body_frame.frame_jacobian(self._model.asked.names, model.body_frame)
         self._nis_sum = np.zeros(4)
         self._nis_count = np.zeros(4)
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
+        self._rested_s = 0.0  # length of all rests so far
 
     def kept_by(self, raw: Callable[[], RawTest]) -> None:
         """Keep nothing here: the caller keeps everything that comes, on a disk, and gives it back by `raw`."""
@@ -305,7 +304,7 @@ class LiveCalibration:
         )
         if len(epochs) < ALIGN_S and len(np.unique(phases.dwell)) == 1:
             return False
-        self._alignment = first_attitude(epochs, phases, self.setup)
+        self._alignment = self._model.begun(first_attitude(epochs, phases, self.setup))
         self._track = self._alignment.C_nb.copy()
         none = np.zeros(len(self.setup.sensors.prior))
         self._state = start_state(self.setup, self._alignment, self._alignment.C_nb, none)
@@ -316,6 +315,9 @@ class LiveCalibration:
         setup, sensors = self.setup, self.setup.sensors
         part = cycles[slice(int(epochs.first[k]), int(epochs.last[k]))]
         rest = np.full(len(part), phases.dwell[k])
+        if self._model.azimuth_free:
+            # The Earth's rate is seen along the attitude: that of the samples as they come is off by the gyro biases.
+            self._track[:, :] = self._state.C_nb
         seen = motion(
             part,
             rest,
@@ -360,20 +362,33 @@ class LiveCalibration:
         )
         out = new_output(1, len(sensors.prior), False, 1)
         run_pass(data, self._settings, self._state, out)
-        measured = np.isfinite(out.nis[0])
-        self._nis_sum[measured] += out.nis[0][measured]
-        self._nis_count[measured] += 3
-        if phases.first[k]:
-            self._stop_nis[:] = 0.0
-        self._stop_nis[:, measured] += np.array([out.nis[0][measured], np.full(int(measured.sum()), 3.0)])
-        return self._report(epochs, phases, k, out.estimate[0])
+        if phases.dwell[k]:
+            self._rest(float(epochs.end[k] - epochs.start[k]))
+        self._count(out.nis[0], bool(phases.first[k]))
+        return self._report(epochs, phases, k)
 
-    def _report(self, epochs: Epochs, phases: Phases, k: int, estimate: Floats) -> EpochEstimate:
+    def _rest(self, seconds: float) -> None:
+        """Take the noise of an epoch at rest into its mean over all rests so far."""
+        assert self._state is not None
+        self._rested_s += seconds
+        if self._model.noise is not None:
+            self._model.noise.rested(self._state, seconds / self._rested_s)
+
+    def _count(self, nis: Floats, first: bool) -> None:
+        """Add the squared innovations of an epoch (4,) to those so far; the `first` of a stop begins its own."""
+        measured = np.isfinite(nis)
+        self._nis_sum[measured] += nis[measured]
+        self._nis_count[measured] += 3
+        if first:
+            self._stop_nis[:] = 0.0
+        self._stop_nis[:, measured] += np.array([nis[measured], np.full(int(measured.sum()), 3.0)])
+
+    def _report(self, epochs: Epochs, phases: Phases, k: int) -> EpochEstimate:
         assert self._state is not None
         origin_ns = self._intake.origin_ns
         assert origin_ns is not None
-        sensors, frame, state = self._asked, self.setup.model.body_frame, self._state
-        p = len(sensors.prior)
+        sensors, frame, state = self._model.asked, self.setup.model.body_frame, self._state
+        values, covariance = self._model.coefficients(state)
         site = self.setup.site
         radius = 6.371e6 + site.height_m
         return EpochEstimate(
@@ -386,8 +401,8 @@ class LiveCalibration:
             names=sensors.names,
             units=tuple(q.unit for q in sensors.parameters),
             display_units=tuple(q.display_unit for q in sensors.parameters),
-            coefficients=body_frame.values_in_frame(sensors.names, estimate[:p], frame),
-            covariance=self._J @ state.P[NAV : NAV + p, NAV : NAV + p] @ self._J.T,
+            coefficients=body_frame.values_in_frame(sensors.names, values, frame),
+            covariance=self._J @ covariance @ self._J.T,
             position_error_m=np.array(
                 [
                     (state.position[0] - site.latitude_rad) * radius,
@@ -397,7 +412,7 @@ class LiveCalibration:
             ),
             velocity=state.velocity.copy(),
             q_nb=quaternion(state.C_nb),
-            navigation_covariance=state.P[:NAV, :NAV].copy(),
+            navigation_covariance=self._model.navigation_covariance(state),
             verdict=stop_verdict(*self._stop_nis),
             nis=_by_channel(self._nis_sum, self._nis_count),
             stop_nis=_by_channel(*self._stop_nis),

@@ -17,7 +17,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import GYRO, REFERENCES, Effect, Parameter, Term
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.imu_model import ImuModel, with_serving
 from sdimu_calibration.core.effects.motion import Motion
 
 NORTH, EAST = NAMES = ("earth_rate_north", "earth_rate_east")
@@ -65,6 +65,19 @@ def of_any_direction(sensors: ImuModel, latitude: float) -> ImuModel:
     mean = sensors.mean.copy()
     mean[sensors.names.index(NORTH)] = -horizontal(latitude)
     return replace(sensors, mean=mean)
+
+
+def with_any_direction(sensors: ImuModel, latitude: float) -> ImuModel:
+    """Put a horizontal Earth rate of any direction behind a model, as two parameters that serve.
+
+    Parameters
+    ----------
+    latitude : float
+        Of the site (rad).
+    """
+    effect = horizontal_earth_rate(latitude)
+    sigmas, none = np.full(2, horizontal(latitude) / float(np.sqrt(2.0))), np.zeros(2)
+    return of_any_direction(with_serving(sensors, [effect], sigmas, none, none), latitude)
 
 
 def horizontal(latitude: float) -> float:

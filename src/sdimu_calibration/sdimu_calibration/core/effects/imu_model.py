@@ -203,22 +203,37 @@ def with_references(sensors: ImuModel, references: Sequence[tuple[Effect, float]
     new = [(effect, sigma) for effect, sigma in references if effect.parameters[0].name not in sensors.names]
     if not new:
         return sensors
-    effects, sigmas = [effect for effect, _ in new], np.array([sigma for _, sigma in new])
-    p, count = len(sensors.parameters), len(new)
-    terms = [(term.channel, p + place) for place, effect in enumerate(effects) for term in effect.terms]
+    sigmas = np.array([sigma for _, sigma in new])
+    return with_serving(sensors, [effect for effect, _ in new], sigmas, np.zeros(len(new)), np.zeros(len(new)))
+
+
+def with_serving(
+    sensors: ImuModel, effects: Sequence[Effect], sigmas: Floats, decay_rate: Floats, drive: Floats
+) -> ImuModel:
+    """Put effects behind the coefficients, as parameters that serve.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        With n parameters in all.
+    sigmas, decay_rate, drive : ndarray, shape (n,)
+        Prior (SI), decay (1/s) and variance that a second adds (SI^2/s) of each parameter.
+    """
+    first = len(sensors.parameters) + np.cumsum([0, *(len(effect.parameters) for effect in effects)])
+    terms = [(t.channel, at + t.parameter) for at, effect in zip(first, effects, strict=False) for t in effect.terms]
     channel, parameter = np.array(terms, dtype=np.int64).T
-    none = np.zeros(count)
+    count = len(sigmas)
     return ImuModel(
         (*sensors.effects, *effects),
-        (*sensors.parameters, *(effect.parameters[0] for effect in effects)),
+        (*sensors.parameters, *(parameter for effect in effects for parameter in effect.parameters)),
         np.concatenate([sensors.channel, channel]),
         np.concatenate([sensors.parameter, parameter]),
         np.concatenate([sensors.prior, sigmas]),
-        np.concatenate([sensors.mean, none]),
+        np.concatenate([sensors.mean, np.zeros(count)]),
         np.concatenate([sensors.restated, np.ones(count, dtype=bool)]),
         np.concatenate([sensors.stated, sigmas]),
-        np.concatenate([sensors.decay_rate, none]),
-        np.concatenate([sensors.drive, none]),
+        np.concatenate([sensors.decay_rate, decay_rate]),
+        np.concatenate([sensors.drive, drive]),
         sensors.serving + count,
     )
 

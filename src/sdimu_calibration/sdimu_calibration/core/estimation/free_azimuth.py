@@ -16,6 +16,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.specification import ImuSpecification, Site
 
 _LOST_RAD = 0.1
 """Sigma of the azimuth (rad) from which it is lost: at three sigma the first order of Earth rate is wrong by 4 % of it,
@@ -34,9 +35,24 @@ def azimuth_is_lost(fit: Fit, terms: Sequence[NoiseTerm]) -> bool:
     """
     if not isinstance(fit, NavigationFit) or fit.azimuth_free or not terms:
         return False
-    site = fit.setup.site
-    known = site.initial_azimuth_rad is not None and site.initial_azimuth_sigma_rad <= _LOST_RAD
-    return not known and azimuth_sigma(fit, terms) > _LOST_RAD
+    return not _stated(fit.setup.site) and azimuth_sigma(fit, terms) > _LOST_RAD
+
+
+def stated_noise_hides_azimuth(imu: ImuSpecification, site: Site) -> bool:
+    """Tell whether the bias instability that an IMU file states hides the azimuth from any test at a site.
+
+    No mean over a rest, however long, falls below it.
+
+    Parameters
+    ----------
+    site : Site
+        One that states the azimuth well enough hides nothing.
+    """
+    return not _stated(site) and imu.gyro_bias_instability > _LOST_RAD * horizontal(site.latitude_rad)
+
+
+def _stated(site: Site) -> bool:
+    return site.initial_azimuth_rad is not None and site.initial_azimuth_sigma_rad <= _LOST_RAD
 
 
 def azimuth_sigma(fit: NavigationFit, terms: Sequence[NoiseTerm]) -> float:
