@@ -1,34 +1,12 @@
-// Keys, the list of keys, and whether the server still answers.
+// Keys, the list of keys, and what a click on a row or a card does.
 (function () {
-  var ALIVE_MS = 2000, SLOW_MS = 20000, missed = 0, lost = false;
   function at(id) { return document.getElementById(id); }
   function press(id) { var button = at(id); if (button && !button.disabled) { button.click(); } }
   function set(id, props) { window.dash_clientside.set_props(id, props); }
 
-  // A server that is gone refuses at once; one that works hard answers late.
-  function ask() {
-    var stop = new AbortController(), timer = setTimeout(function () { stop.abort(); }, SLOW_MS);
-    fetch('alive', {cache: 'no-store', signal: stop.signal}).then(function (answer) {
-      if (!answer.ok) { throw new Error(answer.status); }
-      missed = 0;
-      // What was asked for when the server went is lost; the state is in the page, so that it can begin anew.
-      if (lost) { location.reload(); }
-    }).catch(function () {
-      missed += 1;
-      if (missed >= 2 && !lost) { lost = true; at('lost').hidden = false; at('busy').hidden = true; }
-    }).finally(function () { clearTimeout(timer); setTimeout(ask, ALIVE_MS); });
-  }
-  setTimeout(ask, ALIVE_MS);
-
-  // Components of Dash lack names, and hide elements that a keyboard still reaches: said and mended here.
+  // Components of Dash lack names, and some hide elements that a keyboard still reaches: said and mended here.
   var NAMES = {shows: 'What is shown', which: 'Which stops', candidate: 'Candidate', channel: 'Channel', against: 'Against', added: 'Added effect', held: 'Stops left out', recording: 'Recording', coefficient: 'Coefficient'};
   function mend() {
-    // The button comes after the page has told its theme.
-    document.querySelectorAll('[data-switch-theme]').forEach(function (b) {
-      var words = window.sdimuTheme() === 'dark' ? 'Light page' : 'Dark page';
-      if (b.textContent !== words) { b.textContent = words; }
-    });
-    document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
     document.querySelectorAll('.dash-radioitems').forEach(function (list) { list.setAttribute('role', 'radiogroup'); });
     document.querySelectorAll('.dash-radioitems label').forEach(function (label) { label.removeAttribute('role'); label.removeAttribute('aria-selected'); });
     document.querySelectorAll('#upload input').forEach(function (input) { input.setAttribute('aria-label', 'Effect file'); input.tabIndex = -1; });
@@ -93,8 +71,4 @@
     if (event.target.id === 'help-open') { KEYS['?'](); }
     if (event.target.id === 'help-close') { at('help').hidden = true; }
   });
-  window.addEventListener('sdimu-theme', function () { if (at('heat')) { set('look', {data: window.benchLook()}); } });
-  window.benchLook = function () {
-    return {scale: window.innerWidth >= 2400 ? 1.6 : 1, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
-  };
 })();
