@@ -30,7 +30,8 @@
     a: function () { press('add'); }, j: function () { candidate(1); }, k: function () { candidate(-1); },
     x: function () { press('leave-points'); }, i: function () { press('take-points'); }, s: function () { press('toggle-stop'); },
     b: function () { show(1); }, u: function () { press('undo'); }, r: function () { press('redo'); }, e: function () { press('export'); },
-    '?': function () { var help = at('help'); help.hidden = !help.hidden; if (!help.hidden) { help.focus(); } }, Escape: function () { at('help').hidden = true; }
+    '?': function () { var help = at('help'); help.hidden = !help.hidden; if (!help.hidden) { help.focus(); } }, c: function () { drawer(at('drawer').hidden); },
+    Escape: function () { at('help').hidden = true; drawer(false); }
   };
   document.addEventListener('keydown', function (event) {
     var key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -43,13 +44,40 @@
     }
     if (KEYS[key]) { event.preventDefault(); KEYS[key](); }
   });
-  // A row of the table of coefficients fills the controls above it.
+  // The drawer of coefficients: the row that is chosen opens, and the controls of its prior stand in it.
+  var edited = null;
+  function place() {
+    var rows = document.querySelector('.drawer .rows'), editor = at('editor'), here = rows && rows.querySelector('tr.here');
+    if (!rows) { return; }
+    editor.hidden = !here;
+    if (!here) { return; }
+    rows.style.setProperty('--editor', editor.offsetHeight + 'px');
+    editor.style.top = here.getBoundingClientRect().bottom - rows.getBoundingClientRect().top - editor.offsetHeight - 2 + 'px';
+  }
+  window.benchEdit = function (name) {
+    edited = name || null;
+    // The table of this answer is drawn after it.
+    setTimeout(function () {
+      document.querySelectorAll('tr[data-coefficient]').forEach(function (row) { row.classList.toggle('here', row.dataset.coefficient === edited); });
+      place();
+    }, 0);
+    return edited;
+  };
+  function drawer(open) {
+    at('drawer').hidden = !open;
+    at('coefficients-open').setAttribute('aria-expanded', open);
+    if (open) { place(); at('drawer').focus(); }
+  }
+  window.addEventListener('resize', place);
   document.addEventListener('click', function (event) {
     var row = event.target.closest && event.target.closest('tr[data-coefficient]');
     if (!row) { return; }
     set('coefficient', {value: row.dataset.coefficient});
-    document.querySelectorAll('tr[data-coefficient]').forEach(function (other) { other.classList.toggle('here', other === row); });
-    setTimeout(function () { if (at('mean')) { at('mean').focus(); } }, 0);
+    setTimeout(function () { if (at('mean')) { at('mean').focus({preventScroll: true}); } }, 50);
+  });
+  document.addEventListener('keydown', function (event) {
+    if (event.key === 'Enter' && /^(mean|sigma)$/.test(event.target.id)) { event.preventDefault(); press('set-prior'); }
+    if (event.key === 'Escape' && event.target.closest && event.target.closest('.drawer')) { drawer(false); }
   });
 
   // What the server does is said on the card that asked for it, too.
@@ -70,5 +98,7 @@
   document.addEventListener('click', function (event) {
     if (event.target.id === 'help-open') { KEYS['?'](); }
     if (event.target.id === 'help-close') { at('help').hidden = true; }
+    if (event.target.id === 'coefficients-open') { KEYS.c(); }
+    if (event.target.id === 'coefficients-close') { drawer(false); at('coefficients-open').focus(); }
   });
 })();

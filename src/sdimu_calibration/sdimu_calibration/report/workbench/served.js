@@ -35,11 +35,24 @@
   }
   new MutationObserver(mend).observe(document.documentElement, {childList: true, subtree: true});
 
+  // Width of a number in a cell of a heat map, and what stands beside the cells (px).
+  var NUMBER = 25, MARGINS = 90;
   window.benchLook = function () {
-    return {scale: window.innerWidth >= 2400 ? 1.6 : 1, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
+    var scale = window.innerWidth >= 2400 ? 1.6 : 1, look = {scale: scale, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
+    var wide = at('heat') && at('heat').clientWidth;
+    if (wide) { look.stops = Math.floor((wide / scale - MARGINS) / NUMBER); }
+    return look;
   };
   // Figures are drawn by the command.
-  window.addEventListener('sdimu-theme', function () {
-    if (document.querySelector('.js-plotly-plot')) { window.dash_clientside.set_props('look', {data: window.benchLook()}); }
+  var looks = '', later = null;
+  function drawn() { return document.querySelector('.js-plotly-plot'); }
+  function tell() { if (drawn()) { window.dash_clientside.set_props('look', {data: window.benchLook()}); } }
+  window.addEventListener('sdimu-theme', tell);
+  window.addEventListener('resize', function () {
+    clearTimeout(later);
+    later = setTimeout(function () {
+      var now = JSON.stringify(window.benchLook());
+      if (looks !== now) { looks = now; tell(); }
+    }, 400);
   });
 })();
