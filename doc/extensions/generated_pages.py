@@ -31,7 +31,7 @@ def make(app: Any) -> None:
     """Make the pages of the command line and of the catalogue, and the figures."""
     folder = Path(app.srcdir) / "generated"
     write(folder / "cli.md", page())
-    write(folder / "effects.md", catalogue())
+    write(folder / "effects.md", catalogue(typeset=True))
     program = Path(__file__).with_name("signature_figures.py")
     # The compiler is switched off in this process, and the figures need what it compiles.
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}

@@ -28,5 +28,5 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
     ],
     zip_safe=False,
-    entry_points={"console_scripts": ["rate_table_node = rate_table_sim.nodes.rate_table_node:main"]},
+    entry_points={"console_scripts": ["rate_table_node = rate_table_sim.nodes.programs:rate_table_node"]},
 )

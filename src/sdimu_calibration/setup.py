@@ -122,13 +122,13 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "sdimu = sdimu_calibration.cli.main:main",
-            "adaptive = sdimu_calibration.nodes.adaptive_node:main",
-            "calibration_node = sdimu_calibration.nodes.calibration_node:main",
-            "compensate_node = sdimu_calibration.nodes.compensate_node:main",
-            "recorder_node = sdimu_calibration.nodes.recorder_node:main",
-            "replay_node = sdimu_calibration.nodes.replay_node:main",
-            "table_goals = sdimu_calibration.nodes.table_goals_node:main",
+            "sdimu = sdimu_calibration.cli.start:sdimu",
+            "adaptive = sdimu_calibration.nodes.programs:adaptive",
+            "calibration_node = sdimu_calibration.nodes.programs:calibration_node",
+            "compensate_node = sdimu_calibration.nodes.programs:compensate_node",
+            "recorder_node = sdimu_calibration.nodes.programs:recorder_node",
+            "replay_node = sdimu_calibration.nodes.programs:replay_node",
+            "table_goals = sdimu_calibration.nodes.programs:table_goals",
         ]
     },
 )

@@ -40,7 +40,7 @@ setup(
     ],
     zip_safe=False,
     entry_points={
-        "console_scripts": ["sdimu_node = sdimu_sim.nodes.sdimu_node:main"],
+        "console_scripts": ["sdimu_node = sdimu_sim.nodes.programs:sdimu_node"],
         "sdimu_calibration.verbs": ["simulate = sdimu_sim.cli.simulate:simulate", "run = sdimu_sim.cli.run:run"],
     },
 )

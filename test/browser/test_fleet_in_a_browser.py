@@ -60,3 +60,18 @@ def test_the_certificate_prints_on_a4_and_nothing_is_cut(batch, opened):
     # 210 by 297 mm in points.
     assert all(abs(float(w) - 595.3) < 1.0 and abs(float(h) - 841.9) < 1.0 for w, h in sheets)
     assert opened.faults == []
+
+
+def test_verdict_and_limits_are_on_the_first_screen_and_nothing_is_wider_than_a_narrow_window(batch, opened, tmp_path):
+    folder = batch(units=1, each=3)
+    limits = tmp_path / "limits.yaml"
+    limits.write_text(
+        "format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n  gyro angle random walk: 1 deg/sqrt(h)\n"
+    )
+    datasheet([folder], certificate=True, operator="A. Person", limits=limits)
+    opened.set_viewport_size({"width": 800, "height": 1000})
+    opened.goto(f"file://{folder / 'datasheet.html'}")
+    assert opened.evaluate("document.documentElement.scrollWidth") <= 800
+    told = opened.locator(".verdict li")
+    assert told.all_inner_texts()[1].startswith("pass gyro bias")
+    assert told.last.evaluate("item => item.getBoundingClientRect().bottom") < 400

@@ -257,6 +257,7 @@ def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command
     assert end == pytest.approx(times[19], abs=0.01)
 
     # A click on a row puts estimate, sigma and unit into the controls.
+    page.locator("#coefficients-open").click()
     page.locator("#coefficients tr[data-coefficient=gyro_bias_x] button").click()
     page.wait_for_function("document.getElementById('mean').value.endsWith(' deg/h')")
     assert page.locator("#sigma").input_value().endswith(" deg/h")
@@ -273,6 +274,51 @@ def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command
     assert_same_numbers(calibrated(workbench, home, tmp_path / "again"), exported)
     fixed = next(c for c in exported["coefficients"] if c["name"] == "gyro_bias_x")
     assert fixed["value"] == pytest.approx(math.radians(0.2) / 3600.0, rel=1e-9)
+
+
+def test_a_coefficient_is_edited_in_its_row_beside_the_heat_map(visit: Callable[[], Any]) -> None:
+    page = visit()
+    drawer = page.locator("#drawer")
+    assert drawer.is_hidden()
+    page.keyboard.press("c")
+    row = page.locator("tr[data-coefficient=accel_bias_y]")
+    row.locator("button").click()
+    page.wait_for_function("document.getElementById('mean').value.endsWith(' ug')")
+    inside, place = row.bounding_box(), page.locator("#editor").bounding_box()
+    assert inside["y"] < place["y"]
+    assert place["y"] + place["height"] <= inside["y"] + inside["height"] + 1.0
+    assert page.locator("#heat").bounding_box()["y"] < drawer.bounding_box()["y"]  # the map is still seen
+    page.locator("#mean").fill("110 ug")
+    page.locator("#sigma").fill("5")
+    page.locator("#sigma").press("Enter")
+    # Other rows keep the prior of the IMU's file.
+    row.filter(has_text="free, own prior").wait_for()
+    settle(page)
+    assert "110 \N{PLUS-MINUS SIGN} 5" in row.inner_text()
+    # The table is another one: its row is open again, with the controls in it.
+    inside, place = row.bounding_box(), page.locator("#editor").bounding_box()
+    assert place["y"] + place["height"] <= inside["y"] + inside["height"] + 1.0
+    page.keyboard.press("Escape")
+    drawer.wait_for(state="hidden")
+
+
+def test_in_a_narrow_window_the_candidate_stands_beside_the_map_and_numbers_only_where_they_fit(
+    visit: Callable[[], Any],
+) -> None:
+    page = visit()
+    written = (
+        "document.querySelector('#heat .js-plotly-plot')._fullData[0].text.flat().filter(t => /[0-9]/.test(t)).length"
+    )
+    assert page.evaluate(written) > 100
+    page.set_viewport_size({"width": 800, "height": 1000})
+    page.wait_for_function(f"{written} === 0")
+    settle(page)
+    page.keyboard.press("j")
+    page.locator("#candidate-name").wait_for()
+    settle(page)
+    heat, candidate = page.locator("#heat").bounding_box(), page.locator("#preview").bounding_box()
+    assert candidate["x"] >= heat["x"] + heat["width"]
+    assert heat["y"] - 150 < candidate["y"] < heat["y"] + heat["height"] / 2
 
 
 def test_every_axis_says_its_unit(visit: Callable[[], Any]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 
 import numpy as np
 import pytest
@@ -36,7 +37,18 @@ def test_limits_are_judged_in_the_file_on_the_page_and_in_the_terminal(batch, tm
     assert lines["gyro scale-factor asymmetry"]["verdict"] == "not measured"
     assert lines["gyro bias repeatability"]["recordings"] == 9
     page = (folder / "datasheet.html").read_text()
-    assert "Fail: gyro scale-factor error." in page
+    # The first lines of the page say it of every limit, the worst first.
+    head = page[page.index('class="verdict') : page.index("What was measured")]
+    assert "Fail: gyro scale-factor error. Not measured: gyro scale-factor asymmetry. Pass: 1 of 3 limits." in head
+    verdicts = re.findall(r'<li><b class="\w+">([\w ]+)</b> ([\w -]+): ([^<]+)</li>', head)
+    assert [(verdict, term) for verdict, term, _ in verdicts] == [
+        ("fail", "gyro scale-factor error"),
+        ("not measured", "gyro scale-factor asymmetry"),
+        ("pass", "gyro bias"),
+    ]
+    assert [size.endswith(("ppm (limit 1)", "limit 10 ppm", "deg/h (limit 100)")) for *_, size in verdicts] == [
+        True
+    ] * 3
     assert "size: A4" in page
     told = capsys.readouterr().out
     assert "pass" in told

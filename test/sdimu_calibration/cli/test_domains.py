@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.processes import DOMAINS, RunningTest, is_held, own_domain, running_tests
-from sdimu_calibration.cli.watch_verb import Pace, _outline, watched
+from sdimu_calibration.cli.watch_verb import Pace, _outline, opening_words, watched
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 
@@ -98,3 +98,11 @@ def test_sigmas_at_the_begin_are_those_that_the_node_publishes_first():
     assert first["gyro_bias_x"] == pytest.approx(to_si(1.0, "deg/h"))
     assert first["gyro_misalignment_xy"] == pytest.approx(np.sqrt(2.0) * to_si(1.0, "arcmin"))
     assert _outline(None, None, ())[1] == {}
+
+
+def test_without_a_run_watch_says_at_once_what_it_waits_for_and_how_one_is_started():
+    what, waits = opening_words(None, 7, 0.0)
+    assert what == "watching ROS domain 7; ends with the test, or with Ctrl-C"
+    assert "waiting for the topics of a test" in waits
+    assert waits.endswith("sdimu run --domain 7")  # a domain of its own choice would not be heard here
+    assert opening_words(ABOUT, 7, 5.0) == (f"watching ROS domain 7, the run into {ABOUT.folder}; ends after 5 s",)

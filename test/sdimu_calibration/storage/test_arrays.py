@@ -77,6 +77,8 @@ def test_seconds_are_a_time_and_stops_count_themselves(samples):
         ({"gyr_x": np.zeros(4)}, "no column is called 'gyr_x'; did you mean gyro_x"),
         ({"temperature": np.array(["warm"] * 4)}, "temperature holds no numbers"),
         ({"stop": np.zeros(4)}, "stop without dwell"),
+        ({"gyro": np.zeros((4, 3), complex)}, "gyro holds complex numbers; give real ones, such as gyro.real"),
+        ({"ns": None, "t": np.arange(4) * (1.0 + 0j)}, "t holds complex numbers"),
         ({"ns": None, "t": np.arange(4) * 1e18}, "t is no time in seconds"),
     ],
 )

@@ -60,9 +60,8 @@ def watch(
     from sdimu_calibration.nodes.monitor import Monitor
 
     console, begun = make_console(), time.monotonic()
-    end = f"ends after {seconds:g} s" if seconds else "ends with the test, or with Ctrl-C"
-    where = "" if test is None else f", the run into {test.folder}"
-    console.print(f"watching ROS domain {used}{where}; {end}", highlight=False, soft_wrap=True)
+    for line in opening_words(test, used, seconds):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
     start_ns = None if test is None else test.start_ns
     record = LiveRecord(outline, "" if test is None else test.folder)
     with LivePage(page, record, console) as shown, closing(Monitor(start_ns, first)) as monitor:
@@ -80,6 +79,24 @@ def watch(
     if is_over:
         results = f"; results in {record.folder}" if record.folder else ""
         console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
+
+
+def opening_words(test: RunningTest | None, domain: int, seconds: float) -> tuple[str, ...]:
+    """Say what is watched and until when; where no run is known, what is waited for and how one is started.
+
+    Parameters
+    ----------
+    seconds : float
+        Wall time to watch (s); 0 for no end.
+    """
+    end = f"ends after {seconds:g} s" if seconds else "ends with the test, or with Ctrl-C"
+    if test is not None:
+        return (f"watching ROS domain {domain}, the run into {test.folder}; {end}",)
+    return (
+        f"watching ROS domain {domain}; {end}",
+        f"no sdimu run is in this domain: waiting for the topics of a test. Start one in another terminal: "
+        f"sdimu run --domain {domain}",
+    )
 
 
 def _end(is_over: bool, seconds: float, folder: str) -> End:

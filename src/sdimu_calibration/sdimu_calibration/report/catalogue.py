@@ -5,6 +5,7 @@ from __future__ import annotations
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, REFERENCES, Effect
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.formula import mathml
 
 _ORDER = (BASELINE, "Accelerometer", "Gyro", REFERENCES, "Other")
 
@@ -66,17 +67,30 @@ def sizes(effect: Effect) -> str:
     return ", ".join(f"{grade} {from_si(value, unit):.3g} {unit}" for grade, value in effect.prior.items())
 
 
-def page() -> str:
-    """Make the page of the catalogue, which the book holds as generated/effects.md."""
+def page(typeset: bool = False) -> str:
+    """Make the page of the catalogue, which the book holds as generated/effects.md.
+
+    Parameters
+    ----------
+    typeset : bool
+        Equations as browsers typeset them, for the book; else as plain text, for any reader of Markdown.
+    """
     parts = [_HEAD]
     for title, effects in grouped():
         parts.append(f"\n## {title}\n")
-        parts += [_entry(effect) for effect in effects]
+        parts += [_entry(effect, typeset) for effect in effects]
     return "".join(parts)
 
 
-def _entry(effect: Effect) -> str:
-    lines = [f"\n### {effect.name}\n", f"\n{effect.title}. `{effect.equation}`"]
+def equations(effect: Effect) -> str:
+    """Equations of an effect as a directive of MyST, one line each."""
+    lines = "\n".join(f"<div>{mathml(text)}</div>" for text in effect.equation.split("; "))
+    return f'```{{raw}} html\n<div class="equation">\n{lines}\n</div>\n```\n'
+
+
+def _entry(effect: Effect, typeset: bool) -> str:
+    written = f".\n\n{equations(effect)}" if typeset else f". `{effect.equation}`"
+    lines = [f"\n### {effect.name}\n", f"\n{effect.title}{written}"]
     if effect.description:
         lines.append(f"\n{effect.description}")
     lines.append(f"\n- Coefficients: {_names(effect)}\n- prior: {sizes(effect)}")

@@ -33,7 +33,7 @@ def sigma_history(calibration: Calibration) -> Figure:
         cols=_COLUMNS,
         titles=[title(effect) for effect in panels],
         gap_y=min(_GAP / (_PANEL_HEIGHT * rows), 1.0 / max(rows - 1, 1)),
-        gap_x=0.12,
+        gap_x=0.16,
     )
     kept, end = _thin(history), float(history.t[-1]) / 60.0
     for panel, (effect, indices) in enumerate(panels.items()):

@@ -25,15 +25,16 @@ _SYMBOLS = {
     "dT": "dT",
     "dt": "dt",
     "dy": "dy",
+    "sum": "\u2211",
     "own": "own",
     "cross": "cross",
     "nb": "nb",
     "bn": "bn",
     "ie": "ie",
 }
-_FUNCTIONS = {"exp", "sin", "cos", "tan", "tanh", "log", "sgn", "sqrt", "max", "min", "abs", "sum", "dx"}
-_TOKEN = re.compile(r"[A-Za-z]+'?(?:_[A-Za-z0-9]+)*|\d+(?:\.\d+)?(?:e[-+]?\d+)?|\.\.|\*\*|\s+|.")
-_NAME = re.compile(r"[A-Za-z]+'?(?:_[A-Za-z0-9]+)*")
+_FUNCTIONS = {"exp", "sin", "cos", "tan", "tanh", "log", "sgn", "sqrt", "max", "min", "abs", "dx"}
+_TOKEN = re.compile(r"[A-Za-z]+\d*'?(?:_[A-Za-z0-9]+)*|\d+(?:\.\d+)?(?:e[-+]?\d+)?|\.\.|\*\*|\s+|.")
+_NAME = re.compile(r"[A-Za-z]+\d*'?(?:_[A-Za-z0-9]+)*")
 _LONGEST_SYMBOL = 1
 """Number of letters of a name that is a symbol by itself: longer ones are words unless they are listed or have a
 subscript."""
@@ -52,6 +53,10 @@ def mathml(text: str) -> str:
 def _atom(tokens: list[str], at: int) -> tuple[str, int]:
     """Read what stands at a place with the power or the denominator behind it."""
     piece, at = _single(tokens, at)
+    # A subscript of what stands in brackets: that of a name is a part of it.
+    if at + 1 < len(tokens) and tokens[at] == "_":
+        below, at = _single(tokens, at + 1)
+        piece = f"<msub>{piece}{below}</msub>"
     if at + 1 < len(tokens) and tokens[at] in {"^", "**"}:
         power, at = _single(tokens, at + 1)
         piece = f"<msup>{piece}{power}</msup>"
@@ -65,7 +70,8 @@ def _single(tokens: list[str], at: int) -> tuple[str, int]:
     token = tokens[at]
     if token == "sqrt" and tokens[at + 1 : at + 2] == ["("]:
         inside, end = _group(tokens, at + 1)
-        return f"<msqrt>{inside}</msqrt>", end
+        # Not msqrt: where no font for mathematics is installed its sign is not drawn.
+        return f"<mo>\u221a</mo><mrow><mo>(</mo>{inside}<mo>)</mo></mrow>", end
     if token in "([":
         inside, end = _group(tokens, at)
         close = {"(": ")", "[": "]"}[token]
@@ -96,6 +102,10 @@ def _is_plain(token: str) -> bool:
 def _name(token: str) -> str:
     base, _, below = token.partition("_")
     stem, prime = base.rstrip("'"), "\u2032" if base.endswith("'") else ""
+    letters = stem.rstrip("0123456789")
+    # The number of a coefficient stands below, as its axis does: K2_i, T0.
+    below = ",".join(part for part in (stem[len(letters) :], below) if part)
+    stem = letters
     if stem in _FUNCTIONS:
         return f"<mi>{stem}</mi><mo>\u2061</mo>" if not below else _below(stem, prime, below)
     known = stem in _SYMBOLS or below or len(stem) <= _LONGEST_SYMBOL

@@ -130,7 +130,7 @@ def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figur
     made.x_axes(type="log", title="averaging time (s)", exponentformat="power")
     for column, triad in ((1, "gyro"), (2, "accel")):
         title = f"Allan deviation ({_SHOWN[triad]})"
-        made.y_axes(type="log", title=title, exponentformat="power", col=column)
+        made.y_axes(type="log", title=title, exponentformat="power", dtick="D2", col=column)
     return lay_out(made, 560, showlegend=True, legend={"orientation": "h", "y": -0.18, "x": 0.5, "xanchor": "center"})
 
 

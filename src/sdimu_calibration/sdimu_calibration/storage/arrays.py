@@ -95,6 +95,9 @@ def _column(given: Mapping[str, Any], name: str, n: int) -> Floats:
 
 
 def _numbers(values: Any, name: str) -> Floats:
+    # numpy would drop the imaginary part with no more than a warning.
+    if np.iscomplexobj(values):
+        raise DataError(f"{ARRAYS}: {name} holds complex numbers; give real ones, such as {name}.real")
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -76,7 +76,8 @@ def dot_plot(done: Study) -> Figure:
         )
     names = [one.name for one in people.coefficients]
     figure.shape("line", x0=0.0, x1=0.0, line={"color": INK, "width": 1}, opacity=1)
-    figure.x_axes(title="unit less mean of the units (spreads between units)")
+    # Above: thirty coefficients reach below the first screen.
+    figure.x_axes(title="unit less mean of the units (spreads between units)", side="top")
     figure.y_axes(
         autorange="reversed",
         automargin=True,
@@ -85,7 +86,7 @@ def dot_plot(done: Study) -> Figure:
         categoryarray=names,
         title="coefficient",
     )
-    return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 20, "b": 60})
+    return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 60, "b": 20})
 
 
 def _in_spreads(one: Coefficient) -> Floats:

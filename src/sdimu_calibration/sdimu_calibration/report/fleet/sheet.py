@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 
-from sdimu_calibration.core.fleet.sheet import FAIL, PASS, Line
+from sdimu_calibration.core.fleet.sheet import FAIL, NOT_MEASURED, PASS, UNDECIDED, Line
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.fleet.tables import three
@@ -21,10 +21,16 @@ from sdimu_calibration.storage.files.fleet_folder import Entry
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 HEADINGS = ("term", "value", "95 %", "unit", "n", "limit", "verdict")
+_WORST_FIRST = (FAIL, UNDECIDED, NOT_MEASURED, PASS)
 _COEFFICIENTS = ("coefficient", "estimate", "sigma", "unit")
 _SHEET_STYLE = """
 table.sheet td { white-space: normal; vertical-align: top; } table.sheet td.number { white-space: nowrap; }
-td.pass { color: var(--good); font-weight: bold; } td.fail { color: var(--bad); font-weight: bold; }
+td.pass, b.pass { color: var(--good); font-weight: bold; } td.fail, b.fail { color: var(--bad); font-weight: bold; }
+ul.limits { list-style: none; padding: 0; margin: .4rem 0 0; font-variant-numeric: tabular-nums;
+  display: flex; flex-wrap: wrap; gap: .1rem 2rem; }
+@media (max-width: 1099px) {
+  table.sheet th, table.sheet td { padding: .22rem .35rem; } table.sheet td.quiet { overflow-wrap: anywhere; }
+}
 td.undecided { font-weight: bold; } tr.group td { background: var(--sunken); font-weight: bold; text-align: left; }
 .sign { display: flex; gap: 4em; margin-top: 4em; }
 .sign div { border-top: 1px solid var(--ink); flex: 1; padding-top: .3em; break-inside: avoid; }
@@ -106,15 +112,27 @@ def _verdict(lines: Sequence[Line]) -> str:
     judged = [line for line in lines if line.verdict]
     if not judged:
         return quiet("No limits were stated, so nothing passes or fails: --limits FILE holds the lines against them.")
-    failed = [line.term for line in judged if line.verdict == FAIL]
-    open_ = [line.term for line in judged if line.verdict not in {PASS, FAIL}]
-    if failed:
-        text = f"Fail: {', '.join(failed)}."
-    elif open_:
-        text = f"Undecided: {', '.join(open_)}."
-    else:
-        text = f"Pass: all {len(judged)} limits."
-    return f'<div class="verdict {"bad" if failed or open_ else "good"}">{escape(text)}</div>'
+    said = {kind: [line.term for line in judged if line.verdict == kind] for kind in _WORST_FIRST}
+    bad = said[FAIL] or len(said[PASS]) < len(judged)
+    counted = [
+        f"{kind}: {', '.join(terms) if kind != PASS else f'{len(terms)} of {len(judged)} limits'}"
+        for kind, terms in said.items()
+        if terms
+    ]
+    text = f"{'. '.join(part.capitalize() for part in counted)}."
+    rows = "".join(map(_limit, sorted(judged, key=lambda line: _WORST_FIRST.index(line.verdict))))
+    head = f'<p class="head">{escape(text)}</p>'
+    return f'<div class="verdict {"bad" if bad else "good"}">{head}<ul class="limits">{rows}</ul></div>'
+
+
+def _limit(line: Line) -> str:
+    """Return an item of the list of limits: what was measured beside what is allowed."""
+    unit, limit = line.display_unit, _size(line.limit, line.display_unit)
+    value = (
+        f"{_size(line.value, unit)} {unit} (limit {limit})" if math.isfinite(line.value) else f"limit {limit} {unit}"
+    )
+    kind = line.verdict.split(" ")[0]
+    return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(f"{line.term}: {value}")}</li>'
 
 
 def _table(lines: Sequence[Line]) -> str:

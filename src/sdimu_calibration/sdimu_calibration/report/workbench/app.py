@@ -68,6 +68,13 @@ def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = 
     taking_home.register(app, shelf, doing)
     if judge is not None:
         together.register(app, judge, doing)
+    # The row that is edited is found again in each table that comes.
+    app.clientside_callback(
+        "function(name, _) { return window.benchEdit(name); }",
+        Output("edits", "data"),
+        Input("coefficient", "value"),
+        Input("coefficients", "children"),
+    )
     return app
 
 

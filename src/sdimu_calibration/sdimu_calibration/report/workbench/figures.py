@@ -26,8 +26,14 @@ _MOST_BARS = 14
 _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 
 
-def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
-    """Heat map of the report with a frame around the cell that is looked at."""
+def heat_map(grid: data.Grid, cell: tuple[int, int], most: int = _MOST_NUMBERED) -> Figure:
+    """Heat map of the report with a frame around the cell that is looked at.
+
+    Parameters
+    ----------
+    most : int
+        Number of stops whose numbers stand beside each other.
+    """
     figure = evidence_figures.heat_map(grid)
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
     figure.shape(
@@ -39,7 +45,7 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
         fillcolor="rgba(0, 0, 0, 0)",
         line={"color": BEFORE, "width": 3},
     )
-    if len(grid.stops) > _MOST_NUMBERED:
+    if len(grid.stops) > most:
         # Numbers would run into each other: the sign of what stands out, the number under the mouse.
         signs = [[evidence_figures.sign(value) for value in row] for row in grid.value]
         figure.data[0] |= {"text": signs}
@@ -48,6 +54,11 @@ def heat_map(grid: data.Grid, cell: tuple[int, int]) -> Figure:
     figure.layout |= {"height": HEIGHT, "margin": _SHORT | {"l": 80}}
     figure.y_axes(title="channel", standoff=0)
     return figure
+
+
+def most_numbered(look: Any) -> int:
+    """Return how many stops the page has room for with their numbers, as its look says it."""
+    return int(look.get("stops", _MOST_NUMBERED))
 
 
 def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
@@ -113,9 +124,10 @@ def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, agai
         )
     figure.x_axes(title=against)
     figure.y_axes(title="residual (sigma)", zeroline=True, zerolinecolor=PALE)
-    more = {"dragmode": "select", "clickmode": "event+select", "margin": _SHORT | {"t": 30}}
+    more = {"dragmode": "select", "clickmode": "event+select", "margin": _SHORT | {"t": 44}}
     words = _title(curve, fitted, used, channel, stop)
-    title = {"text": words, "font": {"size": 13}, "y": 0.97, "x": 0, "xref": "paper", "xanchor": "left"}
+    title = {"text": words, "font": {"size": 13}, "y": 0.98, "yanchor": "top"}
+    title |= {"x": 0, "xref": "paper", "xanchor": "left"}
     legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1.0, "yanchor": "bottom", "font": {"size": 11}}
     drawn = gone.any() or curve.signature is not None
     return lay_out(figure, HEIGHT, title=title, legend=legend, showlegend=bool(drawn), **more)

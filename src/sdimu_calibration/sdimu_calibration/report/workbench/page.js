@@ -1,34 +1,12 @@
-// Keys, the list of keys, and whether the server still answers.
+// Keys, the list of keys, and what a click on a row or a card does.
 (function () {
-  var ALIVE_MS = 2000, SLOW_MS = 20000, missed = 0, lost = false;
   function at(id) { return document.getElementById(id); }
   function press(id) { var button = at(id); if (button && !button.disabled) { button.click(); } }
   function set(id, props) { window.dash_clientside.set_props(id, props); }
 
-  // A server that is gone refuses at once; one that works hard answers late.
-  function ask() {
-    var stop = new AbortController(), timer = setTimeout(function () { stop.abort(); }, SLOW_MS);
-    fetch('alive', {cache: 'no-store', signal: stop.signal}).then(function (answer) {
-      if (!answer.ok) { throw new Error(answer.status); }
-      missed = 0;
-      // What was asked for when the server went is lost; the state is in the page, so that it can begin anew.
-      if (lost) { location.reload(); }
-    }).catch(function () {
-      missed += 1;
-      if (missed >= 2 && !lost) { lost = true; at('lost').hidden = false; at('busy').hidden = true; }
-    }).finally(function () { clearTimeout(timer); setTimeout(ask, ALIVE_MS); });
-  }
-  setTimeout(ask, ALIVE_MS);
-
-  // Components of Dash lack names, and hide elements that a keyboard still reaches: said and mended here.
+  // Components of Dash lack names, and some hide elements that a keyboard still reaches: said and mended here.
   var NAMES = {shows: 'What is shown', which: 'Which stops', candidate: 'Candidate', channel: 'Channel', against: 'Against', added: 'Added effect', held: 'Stops left out', recording: 'Recording', coefficient: 'Coefficient'};
   function mend() {
-    // The button comes after the page has told its theme.
-    document.querySelectorAll('[data-switch-theme]').forEach(function (b) {
-      var words = window.sdimuTheme() === 'dark' ? 'Light page' : 'Dark page';
-      if (b.textContent !== words) { b.textContent = words; }
-    });
-    document.querySelectorAll('.dash-dropdown-focus-target').forEach(function (input) { input.tabIndex = -1; });
     document.querySelectorAll('.dash-radioitems').forEach(function (list) { list.setAttribute('role', 'radiogroup'); });
     document.querySelectorAll('.dash-radioitems label').forEach(function (label) { label.removeAttribute('role'); label.removeAttribute('aria-selected'); });
     document.querySelectorAll('#upload input').forEach(function (input) { input.setAttribute('aria-label', 'Effect file'); input.tabIndex = -1; });
@@ -52,7 +30,8 @@
     a: function () { press('add'); }, j: function () { candidate(1); }, k: function () { candidate(-1); },
     x: function () { press('leave-points'); }, i: function () { press('take-points'); }, s: function () { press('toggle-stop'); },
     b: function () { show(1); }, u: function () { press('undo'); }, r: function () { press('redo'); }, e: function () { press('export'); },
-    '?': function () { var help = at('help'); help.hidden = !help.hidden; if (!help.hidden) { help.focus(); } }, Escape: function () { at('help').hidden = true; }
+    '?': function () { var help = at('help'); help.hidden = !help.hidden; if (!help.hidden) { help.focus(); } }, c: function () { drawer(at('drawer').hidden); },
+    Escape: function () { at('help').hidden = true; drawer(false); }
   };
   document.addEventListener('keydown', function (event) {
     var key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -65,13 +44,40 @@
     }
     if (KEYS[key]) { event.preventDefault(); KEYS[key](); }
   });
-  // A row of the table of coefficients fills the controls above it.
+  // The drawer of coefficients: the row that is chosen opens, and the controls of its prior stand in it.
+  var edited = null;
+  function place() {
+    var rows = document.querySelector('.drawer .rows'), editor = at('editor'), here = rows && rows.querySelector('tr.here');
+    if (!rows) { return; }
+    editor.hidden = !here;
+    if (!here) { return; }
+    rows.style.setProperty('--editor', editor.offsetHeight + 'px');
+    editor.style.top = here.getBoundingClientRect().bottom - rows.getBoundingClientRect().top - editor.offsetHeight - 2 + 'px';
+  }
+  window.benchEdit = function (name) {
+    edited = name || null;
+    // The table of this answer is drawn after it.
+    setTimeout(function () {
+      document.querySelectorAll('tr[data-coefficient]').forEach(function (row) { row.classList.toggle('here', row.dataset.coefficient === edited); });
+      place();
+    }, 0);
+    return edited;
+  };
+  function drawer(open) {
+    at('drawer').hidden = !open;
+    at('coefficients-open').setAttribute('aria-expanded', open);
+    if (open) { place(); at('drawer').focus(); }
+  }
+  window.addEventListener('resize', place);
   document.addEventListener('click', function (event) {
     var row = event.target.closest && event.target.closest('tr[data-coefficient]');
     if (!row) { return; }
     set('coefficient', {value: row.dataset.coefficient});
-    document.querySelectorAll('tr[data-coefficient]').forEach(function (other) { other.classList.toggle('here', other === row); });
-    setTimeout(function () { if (at('mean')) { at('mean').focus(); } }, 0);
+    setTimeout(function () { if (at('mean')) { at('mean').focus({preventScroll: true}); } }, 50);
+  });
+  document.addEventListener('keydown', function (event) {
+    if (event.key === 'Enter' && /^(mean|sigma)$/.test(event.target.id)) { event.preventDefault(); press('set-prior'); }
+    if (event.key === 'Escape' && event.target.closest && event.target.closest('.drawer')) { drawer(false); }
   });
 
   // What the server does is said on the card that asked for it, too.
@@ -92,9 +98,7 @@
   document.addEventListener('click', function (event) {
     if (event.target.id === 'help-open') { KEYS['?'](); }
     if (event.target.id === 'help-close') { at('help').hidden = true; }
+    if (event.target.id === 'coefficients-open') { KEYS.c(); }
+    if (event.target.id === 'coefficients-close') { drawer(false); at('coefficients-open').focus(); }
   });
-  window.addEventListener('sdimu-theme', function () { if (at('heat')) { set('look', {data: window.benchLook()}); } });
-  window.benchLook = function () {
-    return {scale: window.innerWidth >= 2400 ? 1.6 : 1, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
-  };
 })();

@@ -172,7 +172,7 @@ def _drawn(
     grid, curve = _chosen(fitted, found, shows, str(looked))
     variable = against if against in fitted.axes else next(iter(fitted.axes))
     residuals = figures.residuals(fitted, curve, channel, None if which == "all" else stop, variable)
-    heat = figures.heat_map(grid, (channel, stop))
+    heat = figures.heat_map(grid, (channel, stop), figures.most_numbered(look))
     return figures.finished(heat, look), figures.finished(residuals, look), None
 
 

@@ -37,7 +37,9 @@ _KEYS = (
     ("S", "leave the stop out, or take it in"),
     ("X, I", "leave selected points out, take them in"),
     ("E", "take home"),
-    ("Esc", "close this list"),
+    ("C", "coefficients, open or closed"),
+    ("Enter", "in the row of a coefficient: take this prior"),
+    ("Esc", "close this list, or the coefficients"),
 )
 
 
@@ -57,6 +59,7 @@ def layout(title: str, together: bool = False) -> Any:
             dcc.Store(id="shown"),
             dcc.Store(id="stop"),
             dcc.Store(id="looked"),
+            dcc.Store(id="edits"),
             dcc.Interval(id="tick", interval=200, disabled=True),
             html.Div(
                 "The workbench does not answer any more. Start it again with the same command: this page then goes on "
@@ -75,7 +78,6 @@ def layout(title: str, together: bool = False) -> Any:
                             html.Div([_left(), _middle(), _right()], className="bench"),
                             html.Div(
                                 [
-                                    _coefficients(),
                                     _own(),
                                     _home(),
                                     *([_set()] if together else []),
@@ -91,6 +93,7 @@ def layout(title: str, together: bool = False) -> Any:
                     )
                 ]
             ),
+            _coefficients(),
         ]
     )
 
@@ -106,6 +109,7 @@ def _bar(title: str) -> Any:
                     html.Button("Undo", id="undo", title="Ctrl+Z"),
                     html.Button("Redo", id="redo", title="Ctrl+Y"),
                     html.Button("Dark page", id="theme", **{"data-switch-theme": ""}),
+                    html.Button("Coefficients", id="coefficients-open", title="C", **{"aria-controls": "drawer"}),
                     html.Button("Keys ?", id="help-open", **{"aria-controls": "help"}),
                 ],
                 className="line",
@@ -246,21 +250,40 @@ def _right() -> Any:
 
 
 def _coefficients() -> Any:
-    return card(
-        "Coefficients",
-        html.Div(
-            [
-                dcc.Dropdown(id="coefficient", placeholder="choose one to fix, free or give a prior", className="pick"),
-                html.Label(["value ", dcc.Input(id="mean", type="text", value="", debounce=False)]),
-                html.Label(["sigma ", dcc.Input(id="sigma", type="text", value="", debounce=False)]),
-                html.Button("Fix at this value", id="fix"),
-                html.Button("Take this prior", id="set-prior"),
-                html.Button("Free again", id="free"),
-            ],
-            className="controls control",
-        ),
-        html.Div(id="coefficients", className="scroll"),
-        more="whole",
+    """Return a drawer at the foot of the page, which leaves the heat map in sight; the row that is chosen is edited."""
+    editor = [
+        html.Label(["value ", dcc.Input(id="mean", type="text", value="", debounce=False)]),
+        html.Label(["sigma ", dcc.Input(id="sigma", type="text", value="", debounce=False)]),
+        html.Button("Take this prior", id="set-prior", title="Enter"),
+        html.Button("Fix at this value", id="fix"),
+        html.Button("Free again", id="free"),
+    ]
+    return html.Section(
+        [
+            html.Div(
+                [
+                    html.H2("Coefficients"),
+                    html.Div(
+                        dcc.Dropdown(id="coefficient", placeholder="click a row to edit it, or search one here"),
+                        className="grow",
+                    ),
+                    html.Button("Close", id="coefficients-close", title="C"),
+                ],
+                className="line control",
+            ),
+            html.Div(
+                [
+                    html.Div(id="coefficients", className="scroll"),
+                    html.Div(editor, id="editor", className="controls control editor", hidden=True),
+                ],
+                className="rows",
+            ),
+        ],
+        id="drawer",
+        className="card drawer",
+        hidden=True,
+        tabIndex="-1",
+        **{"aria-label": "Coefficients"},
     )
 
 
