@@ -93,14 +93,16 @@ def inner_noise(t: Floats, signature: Signature, cut: Stretches, terms: Sequence
     moving = [term for term in terms if term.kind in _MOVING]
     V = signature([_cosine(k, cut) for k in range(1, _COSINES + 1)]).reshape(len(t), _COSINES, len(CHANNELS))
     parts = []
+    roots: dict[tuple[str, float], Floats] = {}
     for begin, end, turning in zip(cut.start.tolist(), cut.end.tolist(), cut.turning.tolist(), strict=True):
         rows = slice(*np.searchsorted(t, (begin, end), side="right").tolist())
         if turning or rows.start == rows.stop:
             continue
-        modes = [
-            V[rows, :, channel] @ _root(moving, TRIADS[channel // 3], end - begin, float(cut.end[-1]))
-            for channel in range(len(CHANNELS))
-        ]
+        length = round(end - begin, 6)
+        for triad in TRIADS:
+            if (triad, length) not in roots:
+                roots[triad, length] = _root(moving, triad, length, float(cut.end[-1]))
+        modes = [V[rows, :, channel] @ roots[TRIADS[channel // 3], length] for channel in range(len(CHANNELS))]
         U, size, _ = np.linalg.svd(np.hstack(modes), full_matrices=False)
         parts.append(_Part(rows, np.ascontiguousarray(U), 1.0 - 1.0 / np.sqrt(1.0 + size**2)))
     return InnerNoise(tuple(parts))
