@@ -214,7 +214,7 @@ def _in_learned_noise(again: Refit, fit: Navigator, segment: Segment) -> Refit:
     if fit.noise is None:
         return again
     at = (segment.begin_s - segment.levelled_s, segment.begin_s + segment.length_s)
-    evidence = fit.evidence()
+    evidence = fit.evidence().in_inner(fit.wander.inner)
     rows = (evidence.epoch >= segment.seen[0]) & (evidence.epoch < segment.seen[1])
     return replace(
         again, covariance=again.covariance + doubt_in_stretch(evidence, rows, fit.wander, fit.noise.terms, at)
