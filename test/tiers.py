@@ -24,6 +24,9 @@ THOROUGH = {
 """Files and folders, with the reason."""
 
 LONG = {
+    "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py": (
+        "test_no_physics_is_named_for_what_moves_within_stretches",
+    ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_consumer-1]",
     ),
