@@ -44,8 +44,8 @@ MUTANTS = (
     Mutant("filter/kalman.py", "P[:k, :k] = FP @ F.T + Q\n", "P[:k, :k] = FP @ F.T - Q\n", (f"{TESTS}/filter",)),
     Mutant(
         "evidence/held_out.py",
-        "        A = J - Ws.T @ Ws + np.diag(weight)\n",
-        "        A = J + np.diag(weight)\n",
+        "        A = self.J - W.T @ W + np.diag(self.weight)\n",
+        "        A = self.J + np.diag(self.weight)\n",
         (f"{TESTS}/evidence", f"{TESTS}/diagnosis"),
     ),
     Mutant(
