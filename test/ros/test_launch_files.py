@@ -26,8 +26,11 @@ def executables() -> dict[tuple[str, str], str]:
     """Module of every executable, by package and name."""
     found = {}
     for setup in ROOT.glob("src/*/setup.py"):
-        for name, module in re.findall(r'"(\w+) = ([\w.]+):main"', setup.read_text()):
-            found[setup.parent.name, name] = module
+        for name, package, program in re.findall(r'"(\w+) = ([\w.]+)\.nodes\.programs:(\w+)"', setup.read_text()):
+            text = (setup.parent / package / "nodes/programs.py").read_text()
+            loaded = re.search(rf'def {program}\(\).*?run_node_program\("([\w.]+)"\)', text, re.DOTALL)
+            assert loaded is not None, name
+            found[setup.parent.name, name] = loaded[1]
     return found
 
 
