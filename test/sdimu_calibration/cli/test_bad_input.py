@@ -17,6 +17,10 @@ UNUSABLE = (
     ("simulate --out new --mount 1e300,0,0", "--mount '1e300,0,0'"),
     ("simulate --out new --plan folder.yaml", "folder.yaml: is a folder"),
     ("simulate --out new --by-hand 100000000", "attitudes by hand"),
+    (
+        "simulate --out new --by-hand 12 --unit 3 --noise 'gyro_noise_flicker=1 deg/h'",
+        "--unit and --noise: a run by hand",
+    ),
     ("simulate --out new --turn-on 'gyro_bias=-1 deg/h'", "--turn-on 'gyro_bias=-1 deg/h'"),
     ("simulate --out new --turn-on 'gyro_bias=nan deg/h'", "--turn-on 'gyro_bias=nan deg/h'"),
     ("simulate --out new --temperature '-300 degC'", "temperature '-300 degC'"),

@@ -75,6 +75,8 @@ class Kind(StrEnum):
     LOOK_AT_MOUNT = auto()
     LOOK_AT_RECORDING = auto()
     """Recording; label of what it alone shows."""
+    RECORD_A_THIRD = auto()
+    """Label of the coefficient that changed; the two recordings."""
     NO_PLAN_TELLS = auto()
     """Label, and what no plan tells it from."""
     RECORD_ONCE_MORE = auto()

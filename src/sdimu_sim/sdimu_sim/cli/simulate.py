@@ -89,6 +89,7 @@ def simulate(
         from sdimu_calibration.storage.files.config import load_imu, load_site
         from sdimu_sim.core.by_hand import ByHand
 
+        _refuse_by_hand(drawn)
         place, sensor = load_site(world.site), load_imu(imu or "mems_by_hand")
         run = ByHand(by_hand, sensor, place, drawn.seed, world.rate, effects=world.effects)
         _by_hand(run, out, truth_path, kept)
@@ -106,6 +107,16 @@ def simulate(
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+
+
+def _refuse_by_hand(drawn: Drawn) -> None:
+    """Refuse what a run by hand does not draw."""
+    given = {"--unit": drawn.unit is not None, "--turn-on": bool(drawn.turn_on), "--noise": bool(drawn.noise)}
+    asked = [option for option, is_there in given.items() if is_there]
+    if asked:
+        raise DataError(
+            f"{' and '.join(asked)}: a run by hand (--by-hand) does not take it; leave it out, or simulate a plan"
+        )
 
 
 def _by_hand(run: ByHand, out: Path, truth_path: Path, kept: Kept) -> None:

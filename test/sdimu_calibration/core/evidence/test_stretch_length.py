@@ -38,13 +38,13 @@ class Ideal:
 def test_a_half_moves_against_the_other_by_the_allan_variance():
     """IEEE Std 952, annex C: K^2 t / 3 for a random walk, (2 ln 2 / pi) B^2 for flicker; twice that of halves of 15 s.
 
-    Time constants below 1 s are left to white noise: it takes 4 B^2 / (15 pi), their density at zero. White
+    Time constants below 1/4 s are left to white noise: it takes B^2 / (15 pi), their density at zero. White
     noise of one in each second gives the difference of two means of 15 s the variance 2 / 15.
     """
     wander = Wander.of(Ideal())
     walk, flicker = NoiseTerm("gyro", "random_walk", size=0.1), NoiseTerm("accel", "flicker", size=0.5)
     assert moves_within(wander, [walk]) == pytest.approx(0.01 * 15.0 / 3.0 * 15.0, rel=1e-6)
-    expected = 0.25 * (4.0 * np.log(2.0) - 4.0 / 15.0) / np.pi
+    expected = 0.25 * (4.0 * np.log(2.0) - 1.0 / 15.0) / np.pi
     assert moves_within(wander, [flicker]) == pytest.approx(expected * 15.0 / 2.0, rel=0.02)
     # Each triad against its own white noise: the one that moves most counts.
     assert moves_within(wander, [walk, flicker]) == pytest.approx(moves_within(wander, [flicker]))

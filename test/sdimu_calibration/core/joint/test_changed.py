@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_evidence import set_evidence
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
@@ -29,6 +30,17 @@ def test_a_coefficient_that_changed_is_told_as_such_and_not_as_physics_that_look
     place = others.names.index(name)
     sigma = float(np.sqrt(others.covariance[place, place]))
     assert found.after.values[found.after.names.index(name)] == pytest.approx(others.values[place], abs=sigma)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_of_two_recordings_the_difference_is_told_and_not_which_of_them_changed(options, which):
+    some = unit_set(37, [short()] * 2, shift={which: {"accel_scale_x": 40e-6}})
+    found = diagnose_set(some.members, options, here)
+    assert [(f.label, f.recording, f.against) for f in found.findings] == [("accel_scale_x", "r1", "r0")]
+    (told,) = found.findings
+    assert told.value == pytest.approx(40e-6 if which else -40e-6, abs=4.0 * told.sigma)
+    assert "from r0 to r1 (two recordings do not tell which of them changed)" in found.sentence
+    assert [one.kind for one in found.advice] == [Kind.RECORD_A_THIRD]
 
 
 def test_the_value_of_one_recording_stands_in_the_evidence_as_its_difference(options):

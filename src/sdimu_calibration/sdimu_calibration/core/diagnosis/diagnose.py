@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.found import Found, found_effects
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, measured_noise
+from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise
 from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, search_until_stable
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, alike_in_window
@@ -221,7 +221,7 @@ def climb(
     after = doubted(outcome(done.fit) if done.chosen else before, widened)
     own = any(c.family == "own" for c in done.chosen)
     raised = alarms(done, after, consistency, base, stated, findings)
-    noise += tuple(term_in_words(term) for term in done.found.noise)
+    noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
     facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, bool(raised))
     word = verdict(facts)

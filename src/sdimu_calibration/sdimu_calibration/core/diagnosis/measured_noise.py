@@ -8,6 +8,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, NoiseTerm
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -17,6 +18,17 @@ go with it."""
 _KURTOSIS = 4.0
 """Kurtosis of the differences of neighbouring seconds (1) from which tails are heavy: Gaussian noise in a test of an
 hour stays below 3.3."""
+
+
+def is_stated(term: NoiseTerm, imu: ImuSpecification) -> bool:
+    """Whether a term of noise is what an IMU file states, within its 95 % interval: then the file is not wrong."""
+    size = {
+        ("gyro", FLICKER): imu.gyro_bias_instability,
+        ("accel", FLICKER): imu.accel_bias_instability,
+        ("gyro", RANDOM_WALK): imu.gyro_random_walk,
+        ("accel", RANDOM_WALK): imu.accel_random_walk,
+    }.get((term.triad, term.kind))
+    return bool(size) and term.low <= size <= term.high
 
 
 def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:

@@ -110,6 +110,10 @@ def _consistent(d: Diagnosis) -> str:
         return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
     nothing = "" if told is None else f" (nothing is missing: {in_percent(told.nothing)})"
     clean = f"The model explains the recording: nothing stands out of the noise{nothing}"
+    if d.found.noise:
+        clean = (
+            f"{clean}; noise has the memory that the IMU's file states: {', '.join(map(term_in_words, d.found.noise))}"
+        )
     return f"{clean}; but {odd}." if odd else f"{clean}."
 
 

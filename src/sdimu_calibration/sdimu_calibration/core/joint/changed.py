@@ -69,6 +69,8 @@ def is_change(key: str) -> bool:
 def with_changes(reports: Sequence[Report], stable: Sequence[Effect]) -> tuple[list[Report], list[str]]:
     """Give recordings the columns of coefficients that may have changed in them.
 
+    Of two recordings the second one alone: that a coefficient is another one in the first shows the same.
+
     Parameters
     ----------
     stable : sequence of Effect
@@ -83,7 +85,10 @@ def with_changes(reports: Sequence[Report], stable: Sequence[Effect]) -> tuple[l
     """
     keys = {p.name: label for e in stable for p, label in zip(e.parameters, e.labels, strict=True)}
     out, labels = [], []
-    for report in reports:
+    for place, report in enumerate(reports):
+        if len(reports) == 2 and not place:
+            out.append(report)
+            continue
         own = [(k, keys[n]) for k, n in enumerate(report.reduction.names) if n in keys]
         new = [tagged(label, report.name) for _, label in own]
         rows = report.reduction

@@ -57,6 +57,9 @@ class SetFinding:
         What the set cannot tell from it.
     probability : float
         That it or one of these is in all recordings, or in this one.
+    against : str
+        The other one of two recordings, where a coefficient is not the same in both: no data tell which of them
+        changed. Empty for all else.
     """
 
     label: str
@@ -69,6 +72,7 @@ class SetFinding:
     display_unit: str
     alike: tuple[str, ...]
     probability: float = float("nan")
+    against: str = ""
 
 
 @dataclass(frozen=True)
@@ -186,13 +190,20 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         place = next(names.index(name) for name in called if name in names)
         title = f"{effect.title}, changed" if is_change(find.key) else effect.title
         own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability))
+    recordings = [report.name for report in found.after.reports]
     return tuple(
         SetFinding(
             *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
-            *(tuple(alike), probability),
+            *(tuple(alike), probability, _against(label, recording, recordings)),
         )
         for label, title, recording, k, z, p, alike, probability in (*shared, *own)
     )
+
+
+def _against(label: str, recording: str, recordings: Sequence[str]) -> str:
+    """Name the other one of two recordings for a change that is told of one; empty for all else."""
+    others = [name for name in recordings if name != recording]
+    return others[0] if recording and len(others) == 1 and is_change(label) else ""
 
 
 def _differences(fit: SetFit) -> tuple[Floats, Floats]:
@@ -269,6 +280,11 @@ def _graded(f: SetFinding) -> Graded:
 
 
 def _named(f: SetFinding) -> str:
+    if f.against:
+        return (
+            f"{named(f.label)}, which differs by {size(f.value, f.sigma, f.display_unit)} from {f.against} to "
+            f"{f.recording} (two recordings do not tell which of them changed)"
+        )
     if f.recording and is_change(f.label):
         return f"{named(f.label)} changed by {size(f.value, f.sigma, f.display_unit)} in {f.recording}"
     where = f" in {f.recording} alone" if f.recording else ""
@@ -311,7 +327,9 @@ def _advice(
     out = next_steps(again)
     closed = {members[0] for members, _ in closing}
     for f in findings:
-        if f.recording:
+        if f.against:
+            out.append(Advice(Kind.RECORD_A_THIRD, (f.label, f.against, f.recording)))
+        elif f.recording:
             out.append(Advice(Kind.LOOK_AT_RECORDING, (f.recording, f.label)))
         elif f.alike and f.label not in closed:
             out.append(Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0])))

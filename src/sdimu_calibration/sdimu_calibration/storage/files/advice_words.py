@@ -159,6 +159,9 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.LOOK_AT_RECORDING: lambda recording, label: (
         f"look what happened in {recording}, or leave it out of the set: {label}"
     ),
+    Kind.RECORD_A_THIRD: lambda label, one, other: (
+        f"record once more: a third recording tells which of {one} and {other} changed ({label})"
+    ),
     Kind.NO_PLAN_TELLS: lambda label, other: (
         f"no plan tells {label} from {other}: record at another temperature, or after another warm-up"
     ),
