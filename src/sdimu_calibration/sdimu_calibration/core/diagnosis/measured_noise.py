@@ -28,7 +28,7 @@ def is_stated(term: NoiseTerm, imu: ImuSpecification) -> bool:
         ("gyro", RANDOM_WALK): imu.gyro_random_walk,
         ("accel", RANDOM_WALK): imu.accel_random_walk,
     }.get((term.triad, term.kind))
-    return bool(size) and term.low <= size <= term.high
+    return size is not None and 0.0 < term.low <= size <= term.high
 
 
 def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consistency, tuple[str, ...]]:
