@@ -31,7 +31,9 @@ def loading(tmp_path, request):
     for name in ("numpy", "rclpy", "typer"):
         (tmp_path / f"{name}.py").write_text(SLOW)
     module, _, function = PROGRAMS[request.param].partition(":")
-    code = f"from {module} import {function}; {function}()"
+    # Where the tests run in the background, Ctrl-C is ignored, and a command would go on ignoring it.
+    heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{heeds}; from {module} import {function}; {function}()"
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with subprocess.Popen(
         [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

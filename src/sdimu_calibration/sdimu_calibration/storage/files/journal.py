@@ -242,6 +242,9 @@ class Journal:
 
     def close(self) -> None:
         """Leave it for a successor."""
+        # A program that is being started meanwhile has the file for a moment, and with it the lock.
+        if not self._file.closed:
+            fcntl.flock(self._file.fileno(), fcntl.LOCK_UN)
         self._file.close()
 
 
