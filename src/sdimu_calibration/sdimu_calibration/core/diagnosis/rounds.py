@@ -25,6 +25,7 @@ from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
 
@@ -122,6 +123,15 @@ def _first_ground(request: Request, progress: Progress) -> Ground:
     p = len(found.evidence.weight)
     strongest = [found.evidence.candidates[i - p] for i in found.chosen[:1]]
     return fresh_ground(request, extended(request, strongest, progress), strongest, False) if strongest else ground
+
+
+def moving_within(request: Request, done: Round) -> Request | None:
+    """Return the request in noise that moves within stretches, where the noise that was found does; else None."""
+    terms = done.found.noise
+    if request.wander is None or moves_within(request.wander, terms) < MOVES:
+        return None
+    wander = wander_in(request.base.bare, terms)
+    return None if wander.inner is None else replace(request, wander=wander)
 
 
 def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fit:

@@ -89,12 +89,20 @@ class Wander:
         Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked.
     inner : InnerNoise or None
         In which U is whitened, and an evidence must be that goes with it.
+    plain : Wander or None
+        The same in white noise, where there is an `inner`.
     """
 
     cut: Stretches
     U: Floats
     learned: tuple[NoiseTerm, ...] | None = None
     inner: InnerNoise | None = None
+    plain: Wander | None = None
+
+    @property
+    def in_white(self) -> Wander:
+        """The same in white noise."""
+        return self if self.plain is None else self.plain
 
     @cached_property
     def square(self) -> Floats:

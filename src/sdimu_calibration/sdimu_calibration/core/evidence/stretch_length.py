@@ -21,7 +21,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
 from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 
-_MOVES = 0.5
+MOVES = 0.5
 """Ratio of the variance between the halves of a stretch to that of white noise, from which the stretch is halved: half
 as much changes a sigma by a fifth."""
 _STRONG = 3.0
@@ -60,14 +60,14 @@ def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
 
 
 def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
-    if moves_within(wander, terms) < _MOVES:
+    if moves_within(wander, terms) < MOVES:
         return wander
     half = Wander.of(evidence, 0.5)
     t = evidence.row_times
-    if t is None or moves_within(half, terms) < _MOVES:
+    if t is None or moves_within(half, terms) < MOVES:
         return half
     inner = inner_noise(t, evidence.signature, half.cut, terms)
-    return replace(half, U=inner.whitened(half.U), inner=inner)
+    return replace(half, U=inner.whitened(half.U), inner=inner, plain=half)
 
 
 def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
