@@ -20,7 +20,7 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise
-from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, moving_within, search_until_stable
+from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, searched
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, alike_in_window
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
@@ -205,11 +205,7 @@ def climb(
     base, consistency, noise = in_measured_noise(fit, progress)
     wander = None if base.learns_scatter else base.wander.in_white
     request = Request(base, tuple(extra), alpha, wander, frozenset(without))
-    done = search_until_stable(request, progress)
-    # Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
-    if finer := moving_within(request, done):
-        request = finer
-        done = search_until_stable(request, progress)
+    request, done = searched(request, progress)
     widened = over_all_models(base, done)
     findings = _findings(base, widened, done)
     progress("report", 0.9)

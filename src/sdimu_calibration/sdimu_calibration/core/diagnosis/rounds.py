@@ -74,6 +74,28 @@ class Round:
         return self.left_after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
 
 
+def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
+    """Search, and again in noise that moves within stretches where the noise that was found does.
+
+    Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
+
+    Returns
+    -------
+    request : Request
+        With the stretches of the last search.
+    done : Round
+        As of `search_until_stable`.
+    """
+    done = search_until_stable(request, progress)
+    if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
+        return request, done
+    wander = wander_in(request.base.bare, done.found.noise)
+    if wander.inner is None:
+        return request, done
+    again = replace(request, wander=wander)
+    return again, search_until_stable(again, progress)
+
+
 def search_until_stable(request: Request, progress: Progress) -> Round:
     """Repeat rounds until the choice stands, then fit it in its noise.
 
@@ -123,15 +145,6 @@ def _first_ground(request: Request, progress: Progress) -> Ground:
     p = len(found.evidence.weight)
     strongest = [found.evidence.candidates[i - p] for i in found.chosen[:1]]
     return fresh_ground(request, extended(request, strongest, progress), strongest, False) if strongest else ground
-
-
-def moving_within(request: Request, done: Round) -> Request | None:
-    """Return the request in noise that moves within stretches, where the noise that was found does; else None."""
-    terms = done.found.noise
-    if request.wander is None or moves_within(request.wander, terms) < MOVES:
-        return None
-    wander = wander_in(request.base.bare, terms)
-    return None if wander.inner is None else replace(request, wander=wander)
 
 
 def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fit:
