@@ -28,7 +28,7 @@ def executables() -> dict[tuple[str, str], str]:
     for setup in ROOT.glob("src/*/setup.py"):
         for name, package, program in re.findall(r'"(\w+) = ([\w.]+)\.nodes\.programs:(\w+)"', setup.read_text()):
             text = (setup.parent / package / "nodes/programs.py").read_text()
-            loaded = re.search(rf'def {program}\(\).*?run_node_program\("([\w.]+)"\)', text, re.DOTALL)
+            loaded = re.search(rf'^{program} = partial\(run_node_program, "([\w.]+)"\)', text, re.MULTILINE)
             assert loaded is not None, name
             found[setup.parent.name, name] = loaded[1]
     return found

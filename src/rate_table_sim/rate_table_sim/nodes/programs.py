@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from sdimu_calibration.loading import run_node_program
 
-
-def rate_table_node() -> None:
-    """Run the node of that name."""
-    run_node_program("rate_table_sim.nodes.rate_table_node")
+rate_table_node = partial(run_node_program, "rate_table_sim.nodes.rate_table_node")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from sdimu_calibration.loading import run_node_program
 
-
-def sdimu_node() -> None:
-    """Run the node of that name."""
-    run_node_program("sdimu_sim.nodes.sdimu_node")
+sdimu_node = partial(run_node_program, "sdimu_sim.nodes.sdimu_node")

@@ -103,9 +103,17 @@ class LinearEvidence(ABC):
         return None
 
     def in_inner(self: E, inner: InnerNoise | None) -> E:
-        """Return an evidence of white noise whitened in noise that moves within stretches."""
+        """Return an evidence of white noise whitened in noise that moves within stretches.
+
+        Raises
+        ------
+        ValueError
+            Of an evidence that is whitened in another one.
+        """
         if inner is None or self.inner is inner:
             return self
+        if self.inner is not None:
+            raise ValueError("an evidence is whitened in what moves within stretches once")
         return replace(self, e=inner.whitened(self.e), W=inner.whitened(self.W), inner=inner)
 
     def conditions(self, cut: Stretches) -> Conditions | None:

@@ -25,8 +25,8 @@ from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, TRIADS, Nois
 from sdimu_calibration.core.specification import EPOCH_S
 
 _TAUS_S = (2.0, 20.0, 200.0, 2e3, 2e4)
-"""Time constants of the Markov states of flicker (s): below the first white noise hides it, within a test what is
-slower than the last is a constant. A decade apart, the density ripples by 6 %."""
+"""Time constants of the Markov states of flicker (s): what is faster than the first is left to white noise, and what is
+slower than the last is a constant within a test. A decade apart, the density ripples by 6 %."""
 _DECADE = float(np.log(10.0))
 """Logarithm of the ratio of neighbouring time constants (1): each state has the variance of this much of the density
 ``B^2 / (2 pi f)``."""
@@ -129,7 +129,7 @@ def _states(term: NoiseTerm) -> Iterator[_State]:
     elif term.kind == FLICKER:
         variance = term.size**2 * _DECADE / np.pi
         for tau in _TAUS_S:
-            # In an epoch as much comes in as fades, so that the variance stays.
+            # In an epoch as much comes in as fades, so that the variance stays. In a longer one, after a gap, it grows.
             drive = float(-np.expm1(-2.0 * EPOCH_S / tau)) * variance / EPOCH_S
             yield _State(f"{FLICKER}(tau={tau:g} s)", float(np.sqrt(variance)), 1.0 / tau, drive)
     else:

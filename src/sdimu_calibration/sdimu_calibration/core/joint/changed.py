@@ -16,13 +16,12 @@ from sdimu_calibration.core.effects.effect import REFERENCES, Effect
 from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.same_unit import SHARE
 from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.specification import ImuSpecification, Model
 
 _CHANGE = "_change"
 """End of the name of the family of the changes of an effect's coefficients."""
-_REPEATABILITY = 0.1
-"""One-sigma size of a change over that of the coefficient (1): data sheets state a repeatability of a tenth."""
 
 
 def stable_effects(model: Model, varying: Collection[str]) -> list[Effect]:
@@ -54,7 +53,7 @@ def change_of(label: str, imu: ImuSpecification) -> Candidate:
         effect,
         family=f"{effect.family or effect.name}{_CHANGE}",
         title=f"{effect.title}, changed",
-        prior={} if size is None else {imu.grade: _REPEATABILITY * size},
+        prior={} if size is None else {imu.grade: SHARE * size},
         scope="recording",
         nearer=None,
     )

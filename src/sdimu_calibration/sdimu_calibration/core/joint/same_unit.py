@@ -19,7 +19,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Option
 
-_SHARE = 0.3
+SHARE = 0.3
 """What one unit differs by from recording to recording (share of the size that the IMU file gives): data sheets state a
 repeatability of a tenth and less."""
 _ODDS = 7.0
@@ -65,7 +65,7 @@ def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str
         values, sigma = np.array(known).T
         mean, variance = np.average(values, weights=sigma**-2), 1.0 / np.sum(sigma**-2)
         d, v = float(report.values[place] - mean), float(report.sigma[place] ** 2 + variance)
-        one, two = v + 2.0 * _SHARE**2 / weight, v + 2.0 / weight
+        one, two = v + 2.0 * SHARE**2 / weight, v + 2.0 / weight
         odds = 0.5 * d * d * (1.0 / one - 1.0 / two) - 0.5 * float(np.log(two / one))
         total += odds
         if odds > most:
