@@ -7,7 +7,7 @@ import pytest
 
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.imu_model import build
-from sdimu_calibration.core.filter.filter_pass import NAV, PassState
+from sdimu_calibration.core.filter.filter_pass import NAV, PassSettings, PassState, _fade
 from sdimu_calibration.core.filter.noise_states import with_noise_states
 from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, NoiseTerm
 from sdimu_calibration.core.specification import EPOCH_S
@@ -41,10 +41,15 @@ def test_flicker_has_the_density_that_defines_it_from_seconds_to_hours(sensors):
         assert density == pytest.approx(2e-8**2 / (2.0 * np.pi * f), rel=0.25)
 
 
-def test_the_variance_of_flicker_stays_while_it_is_not_measured(sensors):
+@pytest.mark.parametrize("T", [EPOCH_S, 30.0, 3600.0])
+def test_the_variance_of_flicker_stays_while_it_is_not_measured(sensors, T):
+    """In an epoch, and over a gap as well."""
     wider, states = with_noise_states(sensors, FLICKERING)
     variance, rate, drive = one_sensor(wider, states)
-    np.testing.assert_allclose(np.exp(-2.0 * rate * EPOCH_S) * variance + drive * EPOCH_S, variance, rtol=1e-12)
+    settings = PassSettings(np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rate, drive, True, True)
+    faded, added = np.empty(len(rate)), np.empty(len(rate))
+    _fade(settings, T, np.ones(len(rate)), faded, added)
+    np.testing.assert_allclose(faded**2 * variance + added, variance, rtol=1e-12)
 
 
 def test_a_random_walk_grows_by_its_density(sensors):

@@ -114,7 +114,7 @@ class PassSettings(NamedTuple):
     velocity_sigma, position_sigma : float
         Sigma of Zv and Zp (m/s, m).
     decay_rate, drive : ndarray, shape (p,)
-        Decay (1/s) and added variance per second of each coefficient.
+        Decay (1/s) and added variance per second, which fades too, of each coefficient.
     closed_loop : bool
         Feed attitude and coefficients back too, not only position and velocity.
     shared_noise : bool
@@ -381,9 +381,11 @@ def _restart(settings: PassSettings, state: PassState) -> None:
 def _fade(settings: PassSettings, T: float, used: Floats, decay: Floats, drive: Floats) -> None:
     """Let coefficients `used` (p,) fade over an epoch (s), in place; fill how far, and the variance that they gain."""
     for j in range(used.shape[0]):
-        d = np.exp(-settings.decay_rate[j] * T)
+        rate = settings.decay_rate[j]
+        d = np.exp(-rate * T)
         decay[j] = d
-        drive[j] = settings.drive[j] * T
+        # What came in early has faded by the end of the epoch.
+        drive[j] = settings.drive[j] * (T if d == 1.0 else -np.expm1(-2.0 * rate * T) / (2.0 * rate))
         if d != 1.0:
             used[j] *= d
 

@@ -129,9 +129,8 @@ def _states(term: NoiseTerm) -> Iterator[_State]:
     elif term.kind == FLICKER:
         variance = term.size**2 * _DECADE / np.pi
         for tau in _TAUS_S:
-            # In an epoch as much comes in as fades, so that the variance stays. In a longer one, after a gap, it grows.
-            drive = float(-np.expm1(-2.0 * EPOCH_S / tau)) * variance / EPOCH_S
-            yield _State(f"{FLICKER}(tau={tau:g} s)", float(np.sqrt(variance)), 1.0 / tau, drive)
+            # As much comes in as fades, so that the variance stays.
+            yield _State(f"{FLICKER}(tau={tau:g} s)", float(np.sqrt(variance)), 1.0 / tau, 2.0 * variance / tau)
     else:
         raise ValueError(f"noise '{term.kind}': the filter has states for {FLICKER} and {RANDOM_WALK}")
 
