@@ -49,3 +49,25 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, mo
         one, other = (re.sub(r"\d+ of", "of", told(text, stop)[0]) for text in (done, seen))
         assert one == other
     assert read_result(tmp_path / "run").names[-1] == EFFECT
+
+
+def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONUNBUFFERED", "1")
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    run, watch = None, sdimu("watch")
+    try:
+        assert watch.stdout is not None
+        assert watch.stdout.readline().startswith("no sdimu run on this machine yet: waiting for one")
+        plan = write_plan(tmp_path / "plan.yaml", 20.0)
+        run = sdimu("run", "--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--out", tmp_path / "run")
+        seen, wrong = watch.communicate(timeout=DEADLINE_S)
+        assert (watch.returncode, wrong) == (0, "")
+        _, err = run.communicate(timeout=DEADLINE_S)
+        assert run.returncode in (0, 3), err
+    finally:
+        for process in (run, watch):
+            if process is not None:
+                process.kill()
+    assert f"the run into {tmp_path / 'run'}" in seen
+    assert "the test has ended" in seen

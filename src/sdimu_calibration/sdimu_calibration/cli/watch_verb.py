@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from sdimu_calibration.report.live_seen import Outline
 
 
+_LOOK_S = 0.5
+"""Time between two looks for a run that has begun (s): nobody waits for it."""
+
+
 @with_options
 def watch(
     model: Annotated[
@@ -47,11 +51,13 @@ def watch(
     from contextlib import closing
 
     from sdimu_calibration.cli.console import console as make_console
-    from sdimu_calibration.cli.processes import enter_domain
+    from sdimu_calibration.cli.processes import enter_domain, stated_domain
     from sdimu_calibration.report.live_page.record import LiveRecord
 
     page.check()
     test = watched(domain)
+    if test is None and domain is None and stated_domain() is None:
+        _wait_for_one(make_console(), seconds)
     outline, first = _outline(test, model, tuple(add or ()))
     if test is not None:
         enter_domain(test.domain)
@@ -79,6 +85,39 @@ def watch(
     if is_over:
         results = f"; results in {record.folder}" if record.folder else ""
         console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
+
+
+def _wait_for_one(console: Console, seconds: float) -> None:
+    """Wait until a run of `sdimu` begins on this machine, and begin anew; or until ROS domain 0 has a test.
+
+    Anew in this process's place: ROS reads the domain and its settings as it is loaded.
+
+    Raises
+    ------
+    DataError
+        After `seconds` (s), unless they are 0.
+    """
+    import os
+    import sys
+    import time
+    from contextlib import closing
+
+    from sdimu_calibration.nodes.monitor import Monitor
+
+    console.print(
+        "no sdimu run on this machine yet: waiting for one, or for nodes in ROS domain 0; Ctrl-C ends. Start one in "
+        "another terminal: sdimu run",
+        highlight=False,
+        soft_wrap=True,
+    )
+    begun = time.monotonic()
+    with closing(Monitor()) as monitor:
+        while watched(None) is None:
+            if monitor.listen(_LOOK_S).heard:
+                return
+            if seconds and time.monotonic() - begun > seconds:
+                raise DataError(f"no run of sdimu began in {seconds:g} s, and ROS domain 0 is silent: state --domain")
+    os.execv(sys.executable, [sys.executable, "-m", "sdimu_calibration.cli.main", *sys.argv[1:]])
 
 
 def opening_words(test: RunningTest | None, domain: int, seconds: float) -> tuple[str, ...]:
