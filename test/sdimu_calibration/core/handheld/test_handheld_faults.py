@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.recording import ClockStep
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
@@ -58,3 +59,41 @@ def test_rates_that_no_hand_makes_are_taken_away(run, sound):
     assert found.data["rejected"] == 3
     assert "spike" in {fault.kind for fault in found.faults}
     assert moved(found, sound) < 2.0
+
+
+@pytest.fixture(scope="module")
+def fastest(run):
+    """Row of the fastest sample."""
+    return int(np.argmax(np.sum(run.omega_ib_b**2, axis=1)))
+
+
+def test_steps_of_the_clock_are_told_with_time_and_size(run, fastest, sound):
+    back, on = ClockStep(0.5, -0.01), ClockStep(float(run.t[fastest]), 0.025)
+    found = calibrate(replace(run, clock_steps=(back, on)), None, MEMS, MODEL, estimator="handheld")
+    texts = [str(fault.text) for fault in found.faults if fault.kind == "clock"]
+    assert texts == [
+        "the clock of the stamps was set back by 10 ms at 0.5 s at rest: samples are taken as even",
+        f"the clock of the stamps was set on by 25 ms at {run.t[fastest]:.1f} s while the IMU turned, or the driver "
+        "paused: samples are taken as even",
+    ]
+    assert moved(found, sound) < 1.0
+
+
+@pytest.mark.parametrize("lost", [5, 30])
+def test_a_driver_that_paused_in_a_turn_moves_nothing(run, fastest, sound, lost):
+    """Its samples are taken as even, and what was turned meanwhile is missing: the turn counts by what is open."""
+    keep = np.ones(len(run.t), dtype=bool)
+    keep[fastest : fastest + lost] = False
+    at, size = float(run.t[fastest]), lost * run.interval_s
+    paused = replace(
+        run,
+        t=np.where(run.t < at, run.t, run.t - size)[keep],
+        omega_ib_b=run.omega_ib_b[keep],
+        f_ib_b=run.f_ib_b[keep],
+        clock_steps=(ClockStep(at, size),),
+    )
+    found = calibrate(paused, None, MEMS, MODEL, estimator="handheld")
+    # In the sigmas of the sound run: a turn that is taken at its word is no noise, but all sigmas would grow with it.
+    sigma = np.sqrt(np.diag(sound.covariance))
+    free = sigma > 0.0
+    assert np.max(np.abs(found.values - sound.values)[free] / sigma[free]) < 3.0

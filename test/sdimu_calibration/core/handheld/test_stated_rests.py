@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.data.stated_rests import without_spans
+from sdimu_calibration.core.data.static_detection import SHORTEST_S, StaticIntervals, detect_static
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.handheld.handheld import Told, prepare_run
@@ -85,3 +86,22 @@ def test_rests_beyond_the_recording_or_twice_are_refused(recording, times):
 def test_numbers_of_stops_are_refused_with_the_option_that_does_it(recording):
     with pytest.raises(DataError, match=r"exclude.times"):
         solve(PreparedTest(recording, IMU).without_stops((3,)), MODEL, "handheld")
+
+
+def test_excluded_times_leave_rests_alone_that_they_do_not_touch(recording, times):
+    """One that was found and is shorter than a piece may be stays as it was found."""
+    found = detect_static(recording)
+    short = round(0.5 * SHORTEST_S / recording.interval_s)
+    rests = StaticIntervals(
+        found.first, np.append(found.first[:1] + short, found.last[1:]), found.gyro_white_noise, found.accel_white_noise
+    )
+    part = without_spans(recording, rests, (times[4],))
+    assert (part.first[0], part.last[0]) == (rests.first[0], rests.last[0])
+    assert len(part) == len(rests) - 1
+
+
+def test_excluded_times_beyond_the_recording_or_backwards_are_refused(recording):
+    with pytest.raises(DataError, match=r"times left out: 900-910 s begins after the recording"):
+        prepare_run(recording, IMU, None, Told(excluded=((900.0, 910.0),)))
+    with pytest.raises(DataError, match=r"times left out: 45-40 s ends before it begins"):
+        prepare_run(recording, IMU, None, Told(excluded=((45.0, 40.0),)))

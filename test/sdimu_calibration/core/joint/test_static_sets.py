@@ -10,8 +10,8 @@ import pytest
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
-from sdimu_calibration.storage.files.config import load_model
-from sdimu_study.static_world import CUBE, GRADES, PAIR, beyond_prior, rests, truth
+from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_study.static_world import CUBE, GRADES, PAIR, beyond_prior, rests, truth, wander
 
 from .conftest import here
 
@@ -23,9 +23,15 @@ FURTHEST, RMS = 4.5, 1.5
 """Error in sigmas that chance reaches in one of 150,000 coefficients, and the RMS of 27 of them in one set of 5,000."""
 
 
-def held_to_truth(result, grade, seed, turns):
+REST_S, PLAIN_S = 40.0, 4.0
+"""Length of a rest, and of one in which a walk moves on by ten times the white noise in its mean (s): in a rest of 36 s
+every draw of it shows. One that takes a whole rest for it is drawn so small in three rests of ten that nothing tells it
+from white noise."""
+
+
+def held_to_truth(result, grade, seed, turns, noise=None):
     """See that the errors of a result are those that its sigmas say."""
-    true, sigma = truth(grade, seed, turns, result.body_frame), np.sqrt(np.diag(result.covariance))
+    true, sigma = truth(grade, seed, turns, result.body_frame, noise), np.sqrt(np.diag(result.covariance))
     without = beyond_prior(grade)
     z = {
         name: (value - true[name]) / s
@@ -42,7 +48,7 @@ def without_azimuth(fit):
     return [r.name for r in fit.reports if len(r.start.names) > len(r.reduction.names)]
 
 
-def checked(members, grade, seed, turns):
+def checked(members, grade, seed, turns, noise=None):
     """Fit recordings together; see that all are used, that the result is one, and that it is right."""
     fit = fit_set(members, OPTIONS, here)
     result = set_outcome(fit)
@@ -53,7 +59,7 @@ def checked(members, grade, seed, turns):
     free = sigma > 0.0
     unit = result.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
     assert np.linalg.eigvalsh(unit).min() > -1e-6
-    held_to_truth(result, grade, seed, turns)
+    held_to_truth(result, grade, seed, turns, noise)
     return fit, result
 
 
@@ -71,7 +77,10 @@ def test_up_and_down_are_a_set_whatever_their_order_and_names(grade, seed):
 @pytest.mark.parametrize("seed", [1, *SEEDS])
 def test_recordings_of_which_none_knows_an_azimuth_are_a_set(seed):
     """Each has two unknowns in the place of its azimuth, which the set has not."""
-    fit, _ = checked(rests("mems_by_hand", seed, PAIR), "mems_by_hand", seed, PAIR)
+    grade = "mems_by_hand"
+    (gyro, _), (_, accel) = wander(load_imu(grade), PLAIN_S), wander(load_imu(grade), REST_S)
+    noise = (gyro, accel)
+    fit, _ = checked(rests(grade, seed, PAIR, noise), grade, seed, PAIR, noise)
     assert without_azimuth(fit) == ["r0", "r1"]
 
 

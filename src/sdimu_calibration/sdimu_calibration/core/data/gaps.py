@@ -157,18 +157,29 @@ def stepped(
     """
     angle, velocity, faults = found.angle.copy(), found.velocity.copy(), []
     for step in steps:
-        cycle = min(int(np.searchsorted(cycles.t, step.t)), len(cycles) - 1)
+        cycle, error = open_angle(step, cycles)
         epoch = min(int(np.searchsorted(epochs.last, cycle, side="right")), len(epochs) - 1)
         resting = bool(_rests(dwell, np.array([epoch]))[0])
-        if not resting and step.size_s > 0.0:
-            rate = float(np.linalg.norm(cycles.alpha[cycle])) / cycles.dt[cycle]
-            error = rate * abs(step.size_s) * step.open
+        if not resting:
             angle[epoch] = math.hypot(angle[epoch], error)
             velocity[epoch] = math.hypot(velocity[epoch], gravity * abs(step.size_s) * error)
-        pause = ", or the driver paused" if step.size_s > 0.0 and step.open > _TOLD else ""
-        text = f"{step} {'at rest' if resting else 'while the IMU turned'}{pause}: samples are taken as even"
-        faults.append(DataFault("clock", text, 1, step.t, step.t))
+        faults.append(step_fault(step, resting))
     return Bridges(found.white, angle, velocity), tuple(faults)
+
+
+def open_angle(step: ClockStep, cycles: Cycles) -> tuple[int, float]:
+    """Place a step of the clock among the cycles, with the sigma of the angle (rad) that it leaves open."""
+    cycle = min(int(np.searchsorted(cycles.t, step.t)), len(cycles) - 1)
+    if step.size_s <= 0.0:
+        return cycle, 0.0
+    return cycle, float(np.linalg.norm(cycles.alpha[cycle])) / float(cycles.dt[cycle]) * step.size_s * step.open
+
+
+def step_fault(step: ClockStep, resting: bool) -> DataFault:
+    """Tell a step of the clock."""
+    pause = ", or the driver paused" if step.size_s > 0.0 and step.open > _TOLD else ""
+    text = f"{step} {'at rest' if resting else 'while the IMU turned'}{pause}: samples are taken as even"
+    return DataFault("clock", text, 1, step.t, step.t)
 
 
 def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:

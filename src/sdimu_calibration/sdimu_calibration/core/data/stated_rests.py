@@ -113,7 +113,7 @@ def _noise(recording: Recording, first: Ints, last: Ints) -> tuple[float, float]
 
 
 def without_spans(recording: Recording, rests: StaticIntervals, spans: Spans) -> StaticIntervals:
-    """Take spans of time out of rests: of each the longest piece stays, if it is long enough for a rest.
+    """Take spans of time out of rests: of one that they cut the longest piece stays, if it is long enough for a rest.
 
     Parameters
     ----------
@@ -125,9 +125,14 @@ def without_spans(recording: Recording, rests: StaticIntervals, spans: Spans) ->
     shortest = max(round(SHORTEST_S / recording.interval_s), _FEWEST)
     taken = np.zeros(len(recording.t), dtype=bool)
     for begin, end in spans:
+        _refuse_beyond(recording, begin, end)
         taken[np.searchsorted(recording.t, begin) : np.searchsorted(recording.t, end, side="right")] = True
     kept = []
     for a, b in zip(rests.first.tolist(), rests.last.tolist(), strict=True):
+        if not taken[a:b].any():
+            # However short: whoever found it took it for a rest.
+            kept.append((a, b))
+            continue
         cut = np.concatenate([[a - 1], a + np.flatnonzero(taken[a:b]), [b]])
         k = int(np.argmax(np.diff(cut)))
         if cut[k + 1] - cut[k] - 1 >= shortest:
@@ -136,3 +141,12 @@ def without_spans(recording: Recording, rests: StaticIntervals, spans: Spans) ->
         raise DataError(f"/imu/data_raw: {Option.EXCLUDE_TIMES} takes every rest away: leave some of the spans out")
     first, last = np.array(kept).T
     return StaticIntervals(first, last, rests.gyro_white_noise, rests.accel_white_noise)
+
+
+def _refuse_beyond(recording: Recording, begin: float, end: float) -> None:
+    if not begin < end:
+        raise DataError(f"times left out: {begin:g}-{end:g} s ends before it begins (expected BEGIN-END)")
+    if begin > recording.t[-1]:
+        raise DataError(
+            f"times left out: {begin:g}-{end:g} s begins after the recording, which is {recording.t[-1]:.0f} s long"
+        )

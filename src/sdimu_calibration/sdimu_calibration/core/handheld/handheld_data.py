@@ -15,7 +15,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.prepared import nominal_interval
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.data.gaps import GAP_SHARE
+from sdimu_calibration.core.data.gaps import GAP_SHARE, open_angle
 from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.data.trembling_rests import Sway, sway
 from sdimu_calibration.core.effects.imu_model import ImuModel
@@ -45,7 +45,8 @@ class HandheldRun:
     first, last : ndarray of int, shape (k - 1,)
         Cycles of each turn.
     turn_s, path, gap : ndarray, shape (k - 1,)
-        Duration (s), angle summed over all ways (rad), and uncertainty of bridged angle (rad) of each turn.
+        Duration (s), angle summed over all ways (rad), and uncertainty (rad) of what gaps and steps of the clock leave
+        open of each turn.
     whole : ndarray of int, shape (w,)
         Turns that are stated to be whole ones about the vertical: `whole_turns`.
     whole_sigma : float
@@ -94,6 +95,9 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     angle = np.sqrt(np.sum(cycles.alpha**2, axis=1))
     gap = GAP_SHARE**2 * np.sum(cycles.gap_angle**2, axis=1)
     gap[cycles.lost * nominal > _UNSEEN_S] = _ANY_TURN**2
+    for step in recording.clock_steps:
+        cycle, error = open_angle(step, cycles)
+        gap[cycle] += _ANY_TURN**2 if step.size_s > _UNSEEN_S else error**2
     return HandheldRun(
         0.5 * (start[begin] + cycles.t[end - 1]),
         part[:, 0],

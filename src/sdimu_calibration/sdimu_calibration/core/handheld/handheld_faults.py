@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.gaps import open_angle, step_fault
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
@@ -61,8 +62,16 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
 
 
 def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution) -> tuple[DataFault, ...]:
-    """List missing samples, readings at the end of the range, and a misfit that no sensor explains."""
-    return (*_missing(run), *_clipped(recording), *_misfit(found))
+    """List missing samples, steps of the clock, readings at the end of the range, misfits that no sensor explains."""
+    return (*_missing(run), *_stepped(recording, run), *_clipped(recording), *_misfit(found))
+
+
+def _stepped(recording: Recording, run: HandheldRun) -> list[DataFault]:
+    out = []
+    for step in recording.clock_steps:
+        cycle, _ = open_angle(step, run.cycles)
+        out.append(step_fault(step, not np.any((run.first <= cycle) & (cycle < run.last))))
+    return out
 
 
 def _missing(run: HandheldRun) -> list[DataFault]:
