@@ -13,7 +13,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.passes import Solution
+from sdimu_calibration.core.filter.passes import Pass, Solution
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.results import NOT_TRUSTED
 
@@ -27,7 +27,7 @@ _SAME = np.cos(np.radians(10.0))
 """Cosine of a rotation (1) above which two attitudes are one: 10 deg are less than any step of a plan."""
 
 
-def azimuth_warning(solution: Solution) -> str | None:
+def azimuth_warning(solution: Solution[Pass]) -> str | None:
     """Say so when there are too few attitudes, or the second order of the azimuth exceeds the sigma of a gyro bias.
 
     The second order is taken at three sigma, against the smallest sigma of a bias. With one or two attitudes the
@@ -55,7 +55,7 @@ def azimuth_warning(solution: Solution) -> str | None:
     )
 
 
-def azimuth_note(solution: Solution) -> str | None:
+def azimuth_note(solution: Solution[Pass]) -> str | None:
     """Say so where the Earth turns about the vertical so nearly that no heading can come from it.
 
     What a gyro bias leaves open of the horizontal Earth rate is an azimuth. The filter's own sigma does not show it:
@@ -81,7 +81,7 @@ def _deg_h(rate: float) -> float:
     return float(np.degrees(rate) * 3600.0)
 
 
-def _attitudes(solution: Solution) -> int:
+def _attitudes(solution: Solution[Pass]) -> int:
     """Count attitudes in which measurements were taken, up to the least that is enough."""
     C = solution.last.output.C_nb[solution.prepared.phases.used]
     count = 0

@@ -17,10 +17,9 @@ from sdimu_calibration.core.estimation.free_inertial import Compensated
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known_pass
 from sdimu_calibration.core.filter.filter_pass import PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import Pass, Solution, pass_settings
+from sdimu_calibration.core.filter.passes import Pass, Solution, motion_about, pass_settings
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.fit_statistics import FitStatistics
-from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.results import History
 
@@ -35,44 +34,13 @@ _LOST = (
 class FilterFit(NavigationFit):
     """A fit by passes of the navigation filter."""
 
-    solution: Solution
+    solution: Solution[Pass]
     estimator = "filter"
-
-    @property
-    def last(self) -> Pass:
-        """The last pass."""
-        return self.solution.last
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return self.solution.passes
-
-    @property
-    def converged(self) -> bool:
-        """Whether the passes stood still at the end."""
-        return self.solution.converged
 
     @property
     def body_frame(self) -> str:
         """Frame that the model asks for."""
         return self.model.body_frame
-
-    @property
-    def values(self) -> Floats:
-        """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.reported_values(self.settled)
-
-    @cached_property
-    def covariance(self) -> Floats:
-        """Covariance of `values`.
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            SI.
-        """
-        return self.reported_covariance(self.settled_covariance)
 
     def reported_values(self, settled: Floats) -> Floats:
         """Bring coefficients into `body_frame`."""
@@ -83,20 +51,22 @@ class FilterFit(NavigationFit):
         J, p = body_frame.frame_jacobian(self.names, self.body_frame), len(self.names)
         return np.asarray(J @ settled[:p, :p] @ J.T)
 
-    @cached_property
-    def known(self) -> KnownPass:
-        """Navigation with the coefficients known at their final values."""
-        return known_pass(self.prepared, self.setup, self.last)
-
     def added_columns(self, count: int) -> Ints:
         """Columns in `evidence` of the last `count` parameters of the model."""
         return np.arange(len(self.names) - count, len(self.names))
 
+    @cached_property
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+        return known_pass(self.prepared, self.setup, self.solution.last)
+
     def run_kinds(self, kind: Ints) -> PassOutput:
         """Repeat the last pass with other kinds of measurement."""
-        state = PassState(*(v.copy() for v in self.last.start))
+        state = PassState(*(v.copy() for v in self.solution.last.start))
         output = new_output(len(kind), len(self.estimate), False, len(kind))
-        run_pass(self.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output)
+        run_pass(
+            self.solution.last.data._replace(kind=kind), pass_settings(self.setup, closed_loop=False), state, output
+        )
         return output
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> FilterFit:
@@ -108,19 +78,8 @@ class FilterFit(NavigationFit):
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
         """Take the errors out of all cycles, to first order."""
-        setup, sensors, cycles = self.setup, self.setup.sensors, prepared.cycles
-        seen = motion(
-            cycles,
-            prepared.rest,
-            sensors,
-            estimate,
-            C_start.copy(),
-            setup.site.latitude_rad,
-            setup.gravity,
-            prepared.temperature,
-            predicted=False,
-            magnetic_n=setup.magnetic_n,
-        )
+        sensors, cycles = self.setup.sensors, prepared.cycles
+        seen = motion_about(prepared, self.setup, C_start, estimate)
         values = sensors.regressors(seen)
         # What fades is known where the fit ended, and fades away from there.
         fading = np.exp(-np.outer(np.abs(seen.t - end_of_fit), sensors.decay_rate[sensors.parameter]))

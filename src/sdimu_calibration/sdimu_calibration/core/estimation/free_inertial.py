@@ -25,7 +25,8 @@ from sdimu_calibration.core.estimation.stretch_doubt import doubt_in_stretch
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import CONVERGED, Pass, one_pass, pass_input, pass_settings
+from sdimu_calibration.core.filter.pass_loop import CONVERGED
+from sdimu_calibration.core.filter.passes import Pass, one_pass, pass_input, pass_settings
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_vector

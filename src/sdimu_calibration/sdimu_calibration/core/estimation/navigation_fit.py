@@ -32,7 +32,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import (
 )
 from sdimu_calibration.core.evidence.stop_misfit import stop_misfit
 from sdimu_calibration.core.filter.filter_pass import PassOutput
-from sdimu_calibration.core.filter.passes import Pass
+from sdimu_calibration.core.filter.passes import Pass, Solution
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -81,6 +81,7 @@ class NavigationFit(Fit):
     setup: TestSetup
     prepared: PreparedData
     alignment: Alignment
+    solution: Solution[Pass] | Solution[SecondOrderPass]
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
     carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
 
@@ -90,14 +91,35 @@ class NavigationFit(Fit):
             object.__setattr__(self, name, value)
 
     @property
-    @abstractmethod
     def last(self) -> Pass | SecondOrderPass:
         """The last pass."""
+        return self.solution.last
 
     @property
-    @abstractmethod
     def passes(self) -> int:
         """Number of passes."""
+        return self.solution.passes
+
+    @property
+    def converged(self) -> bool:
+        """Whether the passes stood still at the end."""
+        return self.solution.converged
+
+    @property
+    def values(self) -> Floats:
+        """Coefficients (SI) in `body_frame`, shape (p,)."""
+        return self.reported_values(self.settled)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Covariance of `values`.
+
+        Returns
+        -------
+        ndarray, shape (p, p)
+            SI.
+        """
+        return self.reported_covariance(self.settled_covariance)
 
     @property
     @abstractmethod
@@ -191,11 +213,8 @@ class NavigationFit(Fit):
     @cached_property
     def _drifts(self) -> dict[str, tuple[int, float]]:
         """Channel of each drift of a bias, and the mean of its regressor over all dwells (SI)."""
-        drifting = [effect for effect in self.setup.sensors.effects if effect.bias_drift]
-        if not drifting:
-            return {}
         out = {}
-        for effect in drifting:
+        for effect in (effect for effect in self.setup.sensors.effects if effect.bias_drift):
             for mean, term in zip(self.dwell_means(effect).tolist(), effect.terms, strict=True):
                 out[effect.parameters[term.parameter].name] = (term.channel, mean)
         return out
@@ -394,11 +413,10 @@ class NavigationFit(Fit):
         """Misfit as a whole and of single stops, and coefficients outside the specification."""
         nis, held_out = statistics.nis_mean, statistics.held_out_rms
         white = "" if self.noise is None else " in white noise"
-        in_turn = self._lost_in_words()
         out: list[str] = [] if self.converged else [NOT_CONVERGED]
         if nis > MISFIT or (held_out is not None and held_out > MISFIT):
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){in_turn}"
+            told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)

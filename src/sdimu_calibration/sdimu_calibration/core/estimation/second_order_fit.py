@@ -17,8 +17,8 @@ from sdimu_calibration.core.estimation.free_inertial import Compensated
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.navigation_evidence import KnownPass, known_second_order_pass
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput
+from sdimu_calibration.core.filter.passes import Solution, motion_about
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
-from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.second_order.second_order_passes import (
@@ -37,18 +37,10 @@ NO_AZIMUTH = (
 
 @dataclass(frozen=True)
 class SecondOrderFit(NavigationFit):
-    """A fit by passes about exactly corrected samples, in the frame of the accelerometers.
+    """A fit by passes about exactly corrected samples, in the frame of the accelerometers."""
 
-    Attributes
-    ----------
-    count : int
-        Number of passes.
-    """
-
+    solution: Solution[SecondOrderPass]
     frame_model: AccelerometerFrameModel
-    finished: SecondOrderPass
-    count: int
-    stood_still: bool
     estimator = "second-order"
 
     @property
@@ -57,34 +49,9 @@ class SecondOrderFit(NavigationFit):
         return earth_rate.EAST in self.setup.sensors.names
 
     @property
-    def last(self) -> SecondOrderPass:
-        """The last pass."""
-        return self.finished
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return self.count
-
-    @property
-    def converged(self) -> bool:
-        """Whether the passes stood still at the end."""
-        return self.stood_still
-
-    @property
     def body_frame(self) -> str:
         """Frame of the accelerometers."""
         return FRAME
-
-    @property
-    def values(self) -> Floats:
-        """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.reported_values(self.settled)
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of `values`, shape (p, p)."""
-        return self.reported_covariance(self.settled_covariance)
 
     def reported_values(self, settled: Floats) -> Floats:
         """Read the coefficients asked for out of those of the estimator."""
@@ -94,18 +61,18 @@ class SecondOrderFit(NavigationFit):
         """Read a covariance out of that of the estimator."""
         return self.frame_model.covariance(settled, self.settled)
 
-    @cached_property
-    def known(self) -> KnownPass:
-        """Navigation with the coefficients known at their final values."""
-        return known_second_order_pass(self.prepared, self.setup, self.alignment, self.last)
-
     def added_columns(self, count: int) -> Ints:
         """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model."""
         return self.frame_model.place[len(self.names) - count :]
 
+    @cached_property
+    def known(self) -> KnownPass:
+        """Navigation with the coefficients known at their final values."""
+        return known_second_order_pass(self.prepared, self.setup, self.alignment, self.solution.last)
+
     def run_kinds(self, kind: Ints) -> PassOutput:
         """Repeat the last pass with other kinds of measurement."""
-        last = self.last
+        last = self.solution.last
         data = last.data._replace(kind=kind)
         return run_stops(data, firm_setup(self.setup), last.start, self.prepared, last.where, last.C_stop)[1]
 
@@ -114,36 +81,23 @@ class SecondOrderFit(NavigationFit):
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
-        last, count, converged = solve_second_order(self.setup, prepared, alignment, begin, silent)
-        return replace(
-            self, prepared=prepared, alignment=alignment, finished=last, count=count, stood_still=converged, noise=None
-        )
+        solution = solve_second_order(self.setup, prepared, alignment, begin, silent)
+        return replace(self, prepared=prepared, alignment=alignment, solution=solution, noise=None)
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
         """Take the errors out of all cycles, exactly; all coefficients are constants, wherever the fit ended."""
         del end_of_fit
-        setup, sensors = self.setup, self.setup.sensors
-        near = motion(
-            prepared.cycles,
-            prepared.rest,
-            sensors,
-            estimate,
-            C_start.copy(),
-            setup.site.latitude_rad,
-            setup.gravity,
-            prepared.temperature,
-            predicted=False,
-            magnetic_n=setup.magnetic_n,
-        )
+        sensors, near = self.setup.sensors, motion_about(prepared, self.setup, C_start, estimate)
         clean = correct_cycles(prepared.cycles, near, sensors, estimate)
         terms = spread(sensors.regressors(clean.seen), sensors.channel, sensors.parameter, clean.weight)
         return Compensated(clean.cycles, *terms)
 
     def history(self) -> History:
         """History of the last pass, at the epochs whose covariance was kept."""
-        rows, out = self.last.rows, self.last.output
+        last = self.solution.last
+        rows, out = last.rows, last.output
         T = self.centring
-        values = self.frame_model.values((self.last.reference + out.estimate[rows]) @ T.T)
+        values = self.frame_model.values((last.reference + out.estimate[rows]) @ T.T)
         covariance = self.frame_model.covariance(T @ out.covariance @ T.T, self.settled)
         history = self._rows_of_history(rows, out, values, covariance)
         if not self.azimuth_free:
@@ -156,6 +110,6 @@ class SecondOrderFit(NavigationFit):
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found; say how many passes were made."""
-        text = f"second order: {self.count} passes about exactly corrected samples, in the accelerometers' frame"
+        text = f"second order: {self.passes} passes about exactly corrected samples, in the accelerometers' frame"
         hidden = (NO_AZIMUTH,) if self.azimuth_free else ()
         return (*super().notes(), text, *hidden)

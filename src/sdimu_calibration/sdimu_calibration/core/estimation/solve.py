@@ -49,7 +49,7 @@ from sdimu_calibration.core.estimation.reference_fits import BatchFit, Classical
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.known_coefficients import attitude_about
-from sdimu_calibration.core.filter.passes import MOST_WIDENINGS, Solution, one_pass, widen_contradicted_priors
+from sdimu_calibration.core.filter.passes import Solution, one_pass
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.progress import Progress, silent
@@ -211,6 +211,14 @@ def _setup(test: PreparedTest, model: Model) -> TestSetup:
     return set_up(test.site, test.imu, model, test.epoch_s(model.settle_s))
 
 
+def _prepared(test: PreparedTest, model: Model, progress: Progress) -> tuple[TestSetup, PreparedData]:
+    """Bring the samples to epochs; the setup then has the noise of these."""
+    setup = _setup(test, model)
+    progress("reduce", 0.0)
+    prepared = test.data(setup)
+    return weighed_for(setup, prepared), prepared
+
+
 def _second_order_model(setup: TestSetup, duration: float) -> AccelerometerFrameModel | None:
     """Model in the accelerometers' frame where squares count and the model can turn; `duration` of the test (s)."""
     turns = setup.model.body_frame == FRAME
@@ -220,10 +228,7 @@ def _second_order_model(setup: TestSetup, duration: float) -> AccelerometerFrame
 
 
 def _filter(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
-    setup = _setup(test, model)
-    progress("reduce", 0.0)
-    prepared = test.data(setup)
-    setup = weighed_for(setup, prepared)
+    setup, prepared = _prepared(test, model, progress)
     inner = replace(setup, sensors=_with_references(setup.sensors, setup))
     solution = solve_filter(inner, prepared, _begin(start, inner.sensors), progress)
     return FilterFit(test, model, setup.sensors, solution.setup, prepared, solution.alignment, solution)
@@ -238,26 +243,15 @@ def _begin(start: Start | None, sensors: ImuModel) -> StartPoint | None:
 def _second_order(
     test: PreparedTest, model: Model, start: Start | None, progress: Progress, azimuth_free: bool = False
 ) -> Fit:
-    setup = _setup(test, model)
-    frame_model = _in_accelerometer_frame(setup, azimuth_free)
-    progress("reduce", 0.0)
-    prepared = test.data(setup)
-    setup = weighed_for(setup, prepared)
+    frame_model = _in_accelerometer_frame(_setup(test, model), azimuth_free)
+    setup, prepared = _prepared(test, model, progress)
     inner = replace(setup, sensors=frame_model.inner)
     alignment = first_attitude(prepared.epochs, prepared.phases, inner)
     begin = _begin(start, inner.sensors)
     if azimuth_free:
         alignment = alignment.with_azimuth_of((begin or coarse_start(prepared, inner, alignment)).C_nb)
-    last, count, converged = solve_second_order(inner, prepared, alignment, begin, progress)
-    for _ in range(MOST_WIDENINGS):
-        wider = widen_contradicted_priors(inner.sensors, last.estimate, last.covariance)
-        if wider is inner.sensors:
-            break
-        inner = replace(inner, sensors=wider)
-        begin = StartPoint(last.smoothed_start, last.estimate)
-        last, more, converged = solve_second_order(inner, prepared, alignment, begin, progress)
-        count += more
-    return SecondOrderFit(test, model, setup.sensors, inner, prepared, alignment, frame_model, last, count, converged)
+    solution = solve_second_order(inner, prepared, alignment, begin, progress)
+    return SecondOrderFit(test, model, setup.sensors, solution.setup, prepared, alignment, solution, frame_model)
 
 
 def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
@@ -298,10 +292,7 @@ class _Reduced:
 
 
 def _reduced(test: PreparedTest, model: Model, progress: Progress) -> _Reduced:
-    setup = _setup(test, model)
-    progress("reduce", 0.0)
-    prepared = test.data(setup)
-    setup = weighed_for(setup, prepared)
+    setup, prepared = _prepared(test, model, progress)
     return _Reduced(setup, prepared, first_attitude(prepared.epochs, prepared.phases, setup))
 
 
@@ -389,9 +380,8 @@ def _navigation_about(
         at = second_order_pass(prepared, setup, alignment, C_nb, coefficients)
         again = second_order_pass(prepared, setup, alignment, at.smoothed_start, coefficients)
         again.state.x[NAV : NAV + len(coefficients)] = 0.0
-        return SecondOrderFit(
-            test, model, frame_model.asked, setup, prepared, alignment, frame_model, again, 2, stood_still=True
-        )
+        done = Solution(setup, prepared, alignment, again, again, 2, converged=True)
+        return SecondOrderFit(test, model, frame_model.asked, setup, prepared, alignment, done, frame_model)
     first = one_pass(prepared, setup, alignment, C_nb, coefficients, closed_loop=False)
     last = one_pass(prepared, setup, alignment, first.smoothed_start, coefficients, closed_loop=False)
     last.state.x[NAV : NAV + len(coefficients)] = 0.0

@@ -1,13 +1,15 @@
 """Passes over a recording: from samples to the converged estimate.
 
 Pass 1 is closed loop. Each later pass is linearised about the coefficients and the smoothed initial attitude of the
-pass before, keeps them fixed, and estimates the deviation from them with the original prior; the passes end when the
-coefficients move by less than `CONVERGED` of their sigmas (Gauss-Newton on the whole test).
+pass before, keeps them fixed, and estimates the deviation from them with the original prior: Gauss-Newton on the whole
+test, in the loop of `pass_loop`, as are passes about exactly corrected cycles (`second_order_passes`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Generic
 
 import numpy as np
 
@@ -18,26 +20,25 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.phases import restarts
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     NAV,
     PassInput,
-    PassOutput,
     PassSettings,
     PassState,
     new_output,
     run_pass,
 )
 from sdimu_calibration.core.filter.impossible_prior import impossible_prior
+from sdimu_calibration.core.filter.pass_loop import AnyPass, Ending, FinishedPass, until_nothing_moves
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.navigation.track import motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, DivergedError
-from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
+from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.wording import Option
 
-CONVERGED = 0.02
-"""Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
 MOST_PASSES = 16
 """Number of passes at most: where the estimate still moves then, `_NEAR` tells slow from lost."""
 _LOOSE_VELOCITY = 1.0
@@ -56,46 +57,19 @@ SNAPSHOT_EPOCHS = 5
 
 
 @dataclass(frozen=True)
-class Pass:
-    """A finished pass: where it was linearised, where it ended.
+class Pass(FinishedPass):
+    """A pass about samples corrected to first order, in the frame of the prior."""
 
-    Attributes
-    ----------
-    C_start : ndarray, shape (3, 3)
-        Initial attitude about which it was linearised, b to n (dimensionless).
-    start, state : PassState
-        At the first sample, and after the last epoch.
-    output : PassOutput
-        One row an epoch.
-    """
-
-    C_start: Floats
-    start: PassState
-    state: PassState
-    output: PassOutput
-    data: PassInput
     settings: PassSettings
+
+    @property
+    def about(self) -> Floats:
+        """Coefficients that are in use, shape (p,)."""
+        return self.state.used
 
     def without_regressors(self) -> Pass:
         """Return the pass without its regressors: of a long recording they are most of what it holds."""
         return replace(self, data=self.data._replace(values=np.empty((0, self.data.values.shape[1]))))
-
-    @property
-    def smoothed_start(self) -> Floats:
-        """Initial attitude as the whole test sees it, shape (3, 3)."""
-        return np.asarray(rotation_matrix(self.state.x[-COPY:].copy()) @ self.C_start)
-
-    @property
-    def estimate(self) -> Floats:
-        """Coefficients at the end (SI), frame of the prior, shape (p,)."""
-        p = len(self.state.used)
-        return np.asarray(self.state.used + self.state.x[NAV : NAV + p])
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of `estimate` (SI), shape (p, p)."""
-        p = len(self.state.used)
-        return np.asarray(self.state.P[NAV : NAV + p, NAV : NAV + p])
 
 
 def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
@@ -182,6 +156,42 @@ def pass_input(prepared: PreparedData, values: Floats, channel: Ints, parameter:
     )
 
 
+def motion_about(
+    prepared: PreparedData,
+    setup: TestSetup,
+    C_nb: Floats,
+    reference: Floats,
+    predicted: bool = False,
+    near: Floats | None = None,
+    causal: bool = False,
+) -> Motion:
+    """Motion that the effects of a test see, as of `track.motion`.
+
+    Parameters
+    ----------
+    C_nb : ndarray, shape (3, 3)
+        Initial attitude, b to n (dimensionless).
+    reference : ndarray, shape (p,)
+        Coefficients whose errors are taken out of the samples (SI).
+    near : ndarray, shape (n, m), optional
+        Regressors about nearly the same coefficients.
+    """
+    return motion(
+        prepared.cycles,
+        prepared.rest,
+        setup.sensors,
+        reference,
+        C_nb.copy(),
+        setup.site.latitude_rad,
+        setup.gravity,
+        prepared.temperature,
+        predicted=predicted,
+        magnetic_n=setup.magnetic_n,
+        near=near,
+        causal=causal,
+    )
+
+
 def one_pass(
     prepared: PreparedData,
     setup: TestSetup,
@@ -211,21 +221,7 @@ def one_pass(
         Regressors of a pass about nearly the same coefficients.
     """
     sensors = setup.sensors
-    seen = motion(
-        prepared.cycles,
-        prepared.rest,
-        sensors,
-        reference,
-        C_nb.copy(),
-        setup.site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
-        predicted=not closed_loop,
-        magnetic_n=setup.magnetic_n,
-        near=near,
-        causal=closed_loop,
-    )
-    values = sensors.regressors(seen)
+    values = sensors.regressors(motion_about(prepared, setup, C_nb, reference, not closed_loop, near, closed_loop))
     if not np.isfinite(values).all():
         raise DataError("a sensor effect of the model is not finite on this recording: check its expression")
     data = pass_input(prepared, values, sensors.channel, sensors.parameter)
@@ -259,38 +255,27 @@ def check_finite(state: PassState) -> None:
         )
 
 
+_ENDING = Ending(MOST_PASSES - 1, settled=_SETTLED, most_loose=MOST_PASSES // 2 - 1, least=2, near=_NEAR)
+"""Passes after the first: where Earth rate says little of the azimuth they contract by a third each, and near enough is
+told from lost."""
+
+
 def refine(
     prepared: PreparedData, setup: TestSetup, start: Alignment, first: Pass, progress: Progress
 ) -> tuple[Pass, int, bool]:
-    """Repeat open-loop passes until the coefficients stand still.
+    """Repeat open-loop passes after `first` by `until_nothing_moves`.
 
     Position and velocity are known so well that the second order of a large error of the initial azimuth contradicts
     them, and holding on to them pins the azimuth where it is. A first pass that did not fit is therefore followed
     by passes that let them go, until the rest has found its place.
-
-    Returns
-    -------
-    last : Pass
-    passes : int
-        Number of all passes, the first one counted.
-    converged : bool
     """
-    last, loose, settling, tight = first, loosened(setup), misfits(first), 0
-    for count in range(2, MOST_PASSES + 1):
-        progress("passes", min(0.95, 0.3 + 0.1 * (count - 1)))
-        reference = last.estimate * (setup.sensors.decay_rate == 0.0)
-        use = loose if settling else setup
-        new = one_pass(prepared, use, start, last.smoothed_start, reference, closed_loop=False, near=last.data.values)
-        moved = furthest_move(new.estimate - last.estimate, new.covariance)
-        last = new
-        if settling:
-            settling = not (moved < _SETTLED or count > MOST_PASSES // 2)
-            continue
-        tight += 1
-        if tight > 1 and moved < CONVERGED:
-            return last, count, True
-    # The passes contract by a third each where Earth rate says little of the azimuth: near enough is told from lost.
-    return last, MOST_PASSES, bool(moved < _NEAR)
+    free, constant = loosened(setup), setup.sensors.decay_rate == 0.0
+
+    def run(at: StartPoint, before: Pass | None, loose: bool) -> Pass:
+        near, reference = (before or first).data.values, at.coefficients * constant
+        return one_pass(prepared, free if loose else setup, start, at.C_nb, reference, closed_loop=False, near=near)
+
+    return until_nothing_moves(run, StartPoint(first.smoothed_start, first.estimate), misfits(first), _ENDING, progress)
 
 
 def loosened(setup: TestSetup) -> TestSetup:
@@ -304,26 +289,6 @@ def misfits(done: Pass) -> bool:
     return bool(np.nansum(nis) > _FITS * 3 * np.isfinite(nis).sum())
 
 
-def furthest_move(step: Floats, covariance: Floats) -> float:
-    """Largest step of a coefficient that is not known.
-
-    Parameters
-    ----------
-    step : ndarray, shape (p,)
-        SI.
-    covariance : ndarray, shape (p, p)
-        SI; zero where a coefficient is known.
-
-    Returns
-    -------
-    float
-        In units of its sigma (1).
-    """
-    sigma = np.sqrt(np.diag(covariance))
-    free = sigma > 0.0
-    return float(np.max(np.abs(step[free]) / sigma[free], initial=0.0))
-
-
 def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Pass:
     """Run a closed-loop pass from the coarse start: where `refine` begins when one dwell may have misled the first."""
     coarse = coarse_start(prepared, setup, start)
@@ -331,13 +296,14 @@ def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> P
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solution(Generic[AnyPass]):
     """A converged calibration with everything that led to it.
 
     Attributes
     ----------
-    first, last : Pass
-        The closed-loop pass (its output: no regressors are kept) and the converged one.
+    first, last : FinishedPass
+        The pass whose estimate on the way is shown, and the converged one: of the filter the closed-loop pass (its
+        output: no regressors are kept), of second-order passes the last one, too.
     passes : int
         How many there were.
     converged : bool
@@ -347,8 +313,8 @@ class Solution:
     setup: TestSetup
     prepared: PreparedData
     alignment: Alignment
-    first: Pass
-    last: Pass
+    first: AnyPass
+    last: AnyPass
     passes: int
     converged: bool
 
@@ -404,7 +370,7 @@ MOST_WIDENINGS = 3
 next time is for coefficients that the first ones had hidden."""
 
 
-def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, progress: Progress) -> Solution:
+def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, progress: Progress) -> Solution[Pass]:
     """Align, run the closed loop, refine.
 
     Parameters
@@ -430,11 +396,26 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
         )
         begun = coarse_pass(prepared, setup, start)
         last, passes, converged = refine(prepared, setup, start, begun, progress)
+    found = Solution(setup, prepared, start, first.without_regressors(), last, 1 + passes, converged)
+    return with_room(found, lambda wider, last: refine(prepared, wider, start, last, progress))
+
+
+def with_room(
+    found: Solution[AnyPass], again: Callable[[TestSetup, AnyPass], tuple[AnyPass, int, bool]]
+) -> Solution[AnyPass]:
+    """Repeat passes with wider priors where the data contradict them.
+
+    Parameters
+    ----------
+    again : callable
+        Goes on from a pass in another setup: the last pass, the number of passes made, whether they converged.
+    """
     for _ in range(MOST_WIDENINGS):
+        setup, last = found.setup, found.last
         wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance)
         if wider is setup.sensors:
             break
         setup = replace(setup, sensors=wider)
-        last, more, converged = refine(prepared, setup, start, last, progress)
-        passes += more - 1
-    return Solution(setup, prepared, start, first.without_regressors(), last, passes, converged)
+        last, more, converged = again(setup, last)
+        found = replace(found, setup=setup, last=last, passes=found.passes + more, converged=converged)
+    return found

@@ -28,22 +28,30 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.alignment.rest_means import Layout, layout
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import check_finite, furthest_move, pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.filter_pass import PassInput, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.pass_loop import Ending, FinishedPass, until_nothing_moves
+from sdimu_calibration.core.filter.passes import (
+    Solution,
+    check_finite,
+    loosened,
+    motion_about,
+    pass_input,
+    pass_settings,
+    start_state,
+    with_room,
+)
 from sdimu_calibration.core.navigation.correct_cycles import CorrectedCycles, correct_cycles, spread
 from sdimu_calibration.core.navigation.strapdown import Cycles
-from sdimu_calibration.core.navigation.track import integrate, motion
+from sdimu_calibration.core.navigation.track import integrate
 from sdimu_calibration.core.progress import Progress
-from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector
+from sdimu_calibration.core.rotation import orthonormal, rotation_vector
 
-CONVERGED = 0.02
-"""Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
 MOST_PASSES = 30
 """Number of passes at most: where the estimate still moves then, it does not converge."""
-_LOOSE = (1.0, 100.0)
-"""Sigmas of Zv (m/s) and Zp (m) in the first passes: too wide to hold a wrong azimuth."""
 _NEAR = 1.0
 """Movement of a coefficient (sigma) from which Zv and Zp are taken in: the azimuth has found its place."""
+_ENDING = Ending(MOST_PASSES, settled=_NEAR, most_loose=MOST_PASSES, least=1, near=0.0)
+"""Passes about corrected samples: each contracts to the square of what was wrong."""
 _FIRM = 0.05
 """Later sigmas of Zv and Zp at least, as a share of what white noise leaves in a motion of `_MOTION_S`: no less can be
 told from zero, and a covariance that falls by more than ten digits loses its symmetry."""
@@ -58,19 +66,15 @@ _OF_EPOCHS = ("first", "last", "white", "gap_angle", "gap_velocity", "kind", "re
 
 
 @dataclass(frozen=True)
-class SecondOrderPass:
-    """A finished pass.
+class SecondOrderPass(FinishedPass):
+    """A finished pass about exactly corrected samples, in the accelerometers' frame.
+
+    The coefficients of its states are deviations from `reference`; its output keeps the covariances of `rows`.
 
     Attributes
     ----------
     reference : ndarray, shape (q,)
         Coefficients at which the samples were corrected (SI).
-    C_start : ndarray, shape (3, 3)
-        Initial attitude about which the pass was linearised, b to n (dimensionless).
-    start, state : PassState
-        At the first sample, and after the last epoch; their coefficients are deviations from `reference`.
-    output : PassOutput
-        Of all epochs; its covariances are those of the epochs `rows`.
     rows : ndarray of int, shape (j,)
         First epoch of each piece of the pass (`run_stops`).
     C_stop : ndarray, shape (k, 3, 3)
@@ -78,37 +82,20 @@ class SecondOrderPass:
     """
 
     reference: Floats
-    C_start: Floats
-    start: PassState
-    state: PassState
-    output: PassOutput
     rows: Ints
-    data: PassInput
     C_stop: Floats
     where: Layout
 
     @property
-    def smoothed_start(self) -> Floats:
-        """Initial attitude as the whole test sees it, shape (3, 3)."""
-        return np.asarray(rotation_matrix(self.state.x[-COPY:].copy()) @ self.C_start)
-
-    @property
-    def estimate(self) -> Floats:
-        """Coefficients at the end (SI), in the accelerometers' frame, shape (q,)."""
-        q = len(self.reference)
-        return np.asarray(self.reference + self.state.x[NAV : NAV + q])
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of `estimate` (SI), shape (q, q)."""
-        q = len(self.reference)
-        return np.asarray(self.state.P[NAV : NAV + q, NAV : NAV + q])
+    def about(self) -> Floats:
+        """Coefficients at which the samples were corrected (SI), shape (q,)."""
+        return self.reference
 
 
 def solve_second_order(
     setup: TestSetup, prepared: PreparedData, start: Alignment, begin: StartPoint | None, progress: Progress
-) -> tuple[SecondOrderPass, int, bool]:
-    """Repeat passes until the coefficients stand still.
+) -> Solution[SecondOrderPass]:
+    """Repeat passes until the coefficients stand still; where they contradict their priors, with wider ones.
 
     Parameters
     ----------
@@ -116,27 +103,20 @@ def solve_second_order(
         With the inner model of an `accelerometer_frame.AccelerometerFrameModel`.
     begin : StartPoint or None
         Attitude and coefficients of the first linearisation; None finds them from all stops.
-
-    Returns
-    -------
-    last : SecondOrderPass
-    passes : int
-    converged : bool
     """
-    first = begin or coarse_start(prepared, setup, start)
-    reference, C_nb, loose = first.coefficients, first.C_nb, begin is None
-    wide = replace(setup, model=replace(setup.model, velocity_sigma=_LOOSE[0], position_sigma=_LOOSE[1]))
-    firm = firm_setup(setup)
-    for count in range(1, MOST_PASSES + 1):
-        progress("passes", min(0.95, 0.2 + 0.05 * count))
-        last = second_order_pass(prepared, wide if loose else firm, start, C_nb, reference)
-        moved = furthest_move(last.estimate - reference, last.covariance)
-        if not loose and moved < CONVERGED:
-            return last, count, True
-        C_nb, reference = last.smoothed_start, last.estimate
-        if loose and moved <= _NEAR:
-            loose = False
-    return last, MOST_PASSES, False
+
+    def passes(setup: TestSetup, begin: StartPoint, loose: bool) -> tuple[SecondOrderPass, int, bool]:
+        wide, firm = loosened(setup), firm_setup(setup)
+
+        def run(at: StartPoint, _: SecondOrderPass | None, loose: bool) -> SecondOrderPass:
+            return second_order_pass(prepared, wide if loose else firm, start, at.C_nb, at.coefficients)
+
+        return until_nothing_moves(run, begin, loose, _ENDING, progress)
+
+    last, count, converged = passes(setup, begin or coarse_start(prepared, setup, start), begin is None)
+    found = Solution(setup, prepared, start, last, last, count, converged)
+    done = with_room(found, lambda setup, last: passes(setup, StartPoint(last.smoothed_start, last.estimate), False))
+    return replace(done, first=done.last)
 
 
 def firm_setup(setup: TestSetup) -> TestSetup:
@@ -188,21 +168,9 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
     reference : ndarray, shape (q,)
         Coefficients whose errors are taken out of the samples (SI).
     """
-    sensors, site, where = setup.sensors, setup.site, layout(prepared)
-    near = motion(
-        prepared.cycles,
-        prepared.rest,
-        sensors,
-        reference,
-        C_nb.copy(),
-        site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
-        predicted=False,
-        magnetic_n=setup.magnetic_n,
-    )
-    clean = correct_cycles(prepared.cycles, near, sensors, reference)
-    C_stop, track = _stops(clean.cycles, where, C_nb, site.latitude_rad)
+    sensors, where = setup.sensors, layout(prepared)
+    clean = correct_cycles(prepared.cycles, motion_about(prepared, setup, C_nb, reference), sensors, reference)
+    C_stop, track = _stops(clean.cycles, where, C_nb, setup.site.latitude_rad)
     seen = _predicted(clean, prepared, where, track, setup)
     values, channel, parameter = spread(sensors.regressors(seen), sensors.channel, sensors.parameter, clean.weight)
     data = pass_input(replace(prepared, cycles=clean.cycles), values, channel, parameter)
@@ -234,7 +202,7 @@ def run_linearised(
     """Run the filter about a linearisation from the state `begin`; `keep` the matrices of every epoch."""
     state, output, rows = run_stops(at.data, setup, begin, prepared, at.where, at.C_stop, keep)
     check_finite(state)
-    return SecondOrderPass(at.reference, at.C_stop[0], begin, state, output, rows, at.data, at.C_stop, at.where)
+    return SecondOrderPass(at.C_stop[0], begin, state, output, at.data, at.reference, rows, at.C_stop, at.where)
 
 
 def _stops(cycles: Cycles, where: Layout, C_nb: Floats, latitude: float) -> tuple[Floats, Floats]:
