@@ -51,7 +51,8 @@ check: setup
 	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
 
-# What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once.
+# What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once;
+# the longest files come first (test/sharing.py).
 test: check
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
 
@@ -60,7 +61,7 @@ test: check
 # `other-blas` then leaves out of these.
 thorough: export OPENBLAS_CORETYPE = Haswell
 thorough: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench"
+	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and ros and not slow and not bench"
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
 # What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last

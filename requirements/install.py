@@ -95,8 +95,9 @@ def to_bytecode() -> None:
 
 def start_kernels() -> None:
     """Begin to compile loops, beside all else; what it does not come to is compiled when it is used first."""
-    command = [sys.executable, str(FOLDER / "kernels.py")]
-    subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for part in ("fit", "simulate"):
+        command = [sys.executable, str(FOLDER / "kernels.py"), part]
+        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def main(names: Sequence[str]) -> int:

@@ -6,9 +6,11 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from sharing import longest_first, sharing
 from tiers import COLLECTED, is_thorough
 
 from rate_table_sim.core import TableSpecification
@@ -39,6 +41,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if is_thorough(item.nodeid, over_dds=item.get_closest_marker("ros") is not None):
             item.add_marker("thorough")
+    items[:] = longest_first(items)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
+    """Share out the tests of a parallel run, where files stay together, as `sharing` says."""
+    return sharing(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 class SmallTest:

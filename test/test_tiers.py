@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from mutants import CORE, MUTANTS
+from sharing import APART, LONGEST, scope_of
 from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -66,3 +67,17 @@ def test_every_mutant_is_one_place_of_the_core():
     for mutant in MUTANTS:
         assert (CORE / mutant.file).read_text().count(mutant.right) == 1, mutant.file
         assert all((ROOT / name).exists() for name in mutant.tests), mutant.file
+
+
+def test_every_file_that_is_shared_out_first_or_test_by_test_is_there():
+    assert not [name for name in (*APART, *LONGEST) if not (ROOT / name).is_file()]
+    assert len(set(LONGEST)) == len(LONGEST)
+
+
+def test_a_file_stays_on_one_worker_unless_its_tests_are_shared_out_one_by_one():
+    assert scope_of("test/a/test_b.py::test_c[d::e]") == "test/a/test_b.py"
+    assert scope_of(f"{APART[0]}::test_c[d]") == f"{APART[0]}::test_c[d]"
+    for name in APART:
+        text = (ROOT / name).read_text()
+        assert 'scope="module"' not in text, name
+        assert "cache" not in text, name

@@ -1,0 +1,87 @@
+"""How tests are shared out to the workers of a parallel run, so that both end at the same time.
+
+A file's tests stay on one worker, which makes its fixtures once. `pytest-xdist` hands out the files with most tests
+first, so a file of few long ones comes last, and one worker ends minutes after the other. Here the longest come first,
+and a file whose tests share no fixture is handed out test by test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+APART = (
+    "test/book/test_blocks.py",
+    "test/recovery/test_faults.py",
+    "test/recovery/test_grades.py",
+    "test/mutation/test_mutations.py",
+    "test/sdimu_calibration/core/joint/test_static_sets.py",
+)
+"""Files of long tests that share nothing: each test goes to the worker that is free."""
+
+LONGEST = (
+    "test/book/test_blocks.py",
+    "test/sdimu_calibration/cli/test_terminal.py",
+    "test/recovery/test_faults.py",
+    "test/recovery/test_grades.py",
+    "test/ros/test_live_diagnosis.py",
+    "test/ros/test_layouts.py",
+    "test/ros/test_ros_machine.py",
+    "test/ros/test_table_goals.py",
+    "test/ros/test_robustness.py",
+    "test/ros/test_checkpoint.py",
+    "test/ros/test_compensate.py",
+    "test/ros/test_whole_run.py",
+    "test/browser/test_workbench_in_a_browser.py",
+    "test/sdimu_calibration/report/workbench/test_workbench.py",
+    "test/sdimu_calibration/core/estimation/test_every_estimator.py",
+    "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
+    "test/sdimu_calibration/core/joint/test_set_search.py",
+    "test/sdimu_calibration/core/joint/test_set_fit.py",
+    "test/sdimu_calibration/core/batch/test_batch.py",
+    "test/recovery/test_recovery.py",
+    "test/sdimu_calibration/core/estimation/test_free_azimuth.py",
+    "test/sdimu_calibration/cli/test_exit_status.py",
+    "test/sdimu_calibration/core/second_order/test_second_order.py",
+    "test/sdimu_calibration/core/noise/test_quantisation.py",
+    "test/sdimu_calibration/cli/test_diagnose.py",
+    "test/sdimu_calibration/core/posterior/test_combinations.py",
+    "test/sdimu_calibration/core/diagnosis/test_coefficient_shifts.py",
+)
+"""Files that keep a processor busy for 20 s and more, about in that order; the rest follow by their number of tests."""
+
+
+def scope_of(name: str) -> str:
+    """Name what stays on one worker with a test: its file, or the test alone.
+
+    Parameters
+    ----------
+    name : str
+        Of the test, as pytest prints it.
+    """
+    file = name.partition("::")[0]
+    return name if file in APART else file
+
+
+def longest_first(items: Sequence[pytest.Item]) -> list[pytest.Item]:
+    """Order tests so that the longest files come first; within a file they keep their order."""
+    files = [item.nodeid.partition("::")[0] for item in items]
+    rank = {file: (0, place) for place, file in enumerate(LONGEST)}
+    rank |= {file: (1, -files.count(file)) for file in set(files) - set(LONGEST)}
+    order = sorted(range(len(items)), key=lambda k: (*rank[files[k]], files[k]))
+    return [items[k] for k in order]
+
+
+def sharing(config: pytest.Config, log: Any) -> object:
+    """Make the scheduler of `pytest-xdist` that hands out scopes in the order of the tests."""
+    # Where tests run in one process, the plugin may be missing.
+    from xdist.scheduler import LoadFileScheduling
+
+    class Sharing(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return scope_of(nodeid)
+
+    config.option.loadscopereorder = False
+    return Sharing(config, log)
