@@ -17,6 +17,8 @@ from sdimu_calibration.report.report_extras import ReportExtras
 _KILOMETRE = 1000.0
 _WHOLE = 100.0
 """Amount from which there are no decimals: three digits of it would be written with an exponent."""
+_CHANCE = 3.0
+"""Error of position over its predicted sigma (1) from which it is no chance, of one stretch or two."""
 _WHOLE_M = 10.0
 """Distance (m) from which metres have no decimals: a tenth of less is still seen."""
 
@@ -82,12 +84,15 @@ class InUse:
         Of the compensations, the worst model first.
     distance : tuple of float
         Root mean square of the error of position at the end of the stretches (m), one a compensation.
+    promised : float
+        What the fit of the last compensation expects of the same (m); NaN where there is none.
     """
 
     minutes: float
     stretches: int
     names: tuple[str, ...]
     distance: tuple[float, ...]
+    promised: float = float("nan")
 
     @property
     def figures(self) -> str:
@@ -104,8 +109,17 @@ class InUse:
         """What the distances are, and of which compensations."""
         return (
             f"position after {self.minutes:.0f} min without aid, over {self.where} that no fit has seen: "
-            f"{', '.join(self.names)}"
+            f"{', '.join(self.names)}{self._expected}"
         )
+
+    @property
+    def _expected(self) -> str:
+        """What the last fit predicted, and whether what it found fails beyond the data it is made of."""
+        if not np.isfinite(self.promised):
+            return ""
+        told = f"; the last fit predicted {metres(self.promised)}"
+        fails = len(self.distance) > 2 and self.distance[-1] > max(self.distance[-2], _CHANCE * self.promised)
+        return f"{told}: what was found does not hold where it was not fitted" if fails else told
 
 
 def in_use(more: ReportExtras | None) -> InUse | None:
@@ -116,7 +130,9 @@ def in_use(more: ReportExtras | None) -> InUse | None:
     ends = np.array([[float(drift.distance[-1]) for drift in trial.drifts] for trial in trials])
     names = tuple("not compensated" if drift.name == NOTHING else drift.name for drift in trials[0].drifts)
     minutes = float(np.mean([trial.segment.length_s for trial in trials])) / 60.0
-    return InUse(minutes, len(trials), names, tuple(np.sqrt(np.mean(ends**2, axis=0)).tolist()))
+    promised = np.array([float(trial.drifts[-1].promised[-1]) for trial in trials])
+    distance = np.sqrt(np.mean(ends**2, axis=0)).tolist()
+    return InUse(minutes, len(trials), names, tuple(distance), float(np.sqrt(np.mean(promised**2))))
 
 
 def in_metres(values: Sequence[float]) -> str:

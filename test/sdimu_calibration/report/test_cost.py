@@ -1,0 +1,31 @@
+"""What a missing effect costs, in metres: what the fit predicted stands beside what came out."""
+
+from __future__ import annotations
+
+import pytest
+
+from sdimu_calibration.report.cost import InUse
+
+NAMES = ("not compensated", "model as given", "with what was found")
+
+
+@pytest.mark.parametrize(
+    ("metres", "told"),
+    [
+        ((2500.0, 105.0, 40.0), "the last fit predicted 27 m"),
+        ((2500.0, 40.0, 60.0), "the last fit predicted 27 m"),
+        ((2500.0, 40.0, 105.0), "the last fit predicted 27 m: what was found does not hold where it was not fitted"),
+        ((2500.0, 200.0, 105.0), "the last fit predicted 27 m"),
+    ],
+    ids=["better", "worse by chance", "worse than chance", "better than before"],
+)
+def test_metres_are_told_beside_what_the_last_fit_predicted(metres, told):
+    assert InUse(10.0, 2, NAMES, metres, 27.0).words.endswith(f"with what was found; {told}")
+
+
+def test_a_model_that_lacks_nothing_is_not_said_to_fail():
+    assert InUse(10.0, 1, NAMES[:2], (2500.0, 500.0), 27.0).words.endswith("model as given; the last fit predicted 27 m")
+
+
+def test_nothing_is_said_where_no_fit_predicts():
+    assert InUse(10.0, 1, NAMES[:1], (2500.0,)).words.endswith("seen: not compensated")
