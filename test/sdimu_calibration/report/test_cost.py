@@ -24,7 +24,9 @@ def test_metres_are_told_beside_what_the_last_fit_predicted(metres, told):
 
 
 def test_a_model_that_lacks_nothing_is_not_said_to_fail():
-    assert InUse(10.0, 1, NAMES[:2], (2500.0, 500.0), 27.0).words.endswith("model as given; the last fit predicted 27 m")
+    assert InUse(10.0, 1, NAMES[:2], (2500.0, 500.0), 27.0).words.endswith(
+        "model as given; the last fit predicted 27 m"
+    )
 
 
 def test_nothing_is_said_where_no_fit_predicts():

@@ -217,3 +217,11 @@ def test_a_prior_of_zero_is_refused_by_every_estimate(tmp_path, prior):
 def test_a_latitude_may_have_its_unit_behind_it(tmp_path, latitude):
     site = load_site(written(tmp_path, SITE.replace("36.4", latitude)))
     assert np.degrees(site.latitude_rad) == pytest.approx(36.4, abs=1e-3)
+
+
+def test_a_bare_name_is_a_file_of_the_working_directory_where_config_has_none(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine.map", "kim18"):
+        (tmp_path / name).write_text("format: sdimu-plan/1\n")
+    assert find_config("plan", "mine.map").resolve() == tmp_path / "mine.map"
+    assert find_config("plan", "kim18").name == "kim18.yaml"  # what the documentation names is not hidden by a file

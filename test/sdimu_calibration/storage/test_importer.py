@@ -260,6 +260,7 @@ def test_files_that_are_not_what_they_are_called_are_told(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01\x9f")
     assert "is not text" in refusal([tmp_path / "binary.csv"], chart(tmp_path))
     assert "no such file" in refusal([tmp_path / "absent.csv"], chart(tmp_path))
+    assert "is a folder: name the files in it" in refusal([tmp_path], chart(tmp_path))
 
 
 def test_the_example_of_the_documentation_works(tmp_path):

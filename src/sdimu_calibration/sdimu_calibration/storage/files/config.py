@@ -135,7 +135,8 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     kind : str
         Folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
     name_or_path : str or Path
-        A bare name is looked up in the config folder; whatever looks like a path is taken as it is.
+        A bare name is looked up in the config folder, then among the files of the working directory; whatever looks
+        like a path is taken as it is.
     """
     text = str(name_or_path)
     path = Path(text)
@@ -149,6 +150,8 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     for suffix in _SUFFIXES:
         if (folder / f"{text}{suffix}").is_file():
             return folder / f"{text}{suffix}"
+    if path.is_file():
+        return path
     known = _known(kind)
     raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
 

@@ -16,7 +16,7 @@ from sdimu_calibration.storage.bags.bag_writer import write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
 from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap
 from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
-from sdimu_calibration.storage.importing.text_table import TextTable
+from sdimu_calibration.storage.importing.text_table import TextTable, check_file
 
 _KELVIN = 273.15
 APART_NS = 60_000_000_000
@@ -160,8 +160,7 @@ def write_imported(path: Path, found: Imported, replace: bool = False, custom: M
 
 
 def _open(path: Path, chart: ImportMap) -> Table:
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
+    check_file(path)
     kind = path.suffix.lower()
     if kind == ".npz":
         return read_npz(path)

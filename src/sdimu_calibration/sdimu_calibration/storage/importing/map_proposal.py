@@ -12,7 +12,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale, gyro_scale
 from sdimu_calibration.storage.importing.columns import Pair, TimeColumn, pairs_by_heading, pairs_by_numbers, time_of
-from sdimu_calibration.storage.importing.text_table import TextTable
+from sdimu_calibration.storage.importing.text_table import TextTable, check_file
 
 _UNKNOWN_HZ = 100.0
 """Sample rate (Hz) that stands in a map of a file without times, to be corrected by the user."""
@@ -44,8 +44,7 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
         Files of one form; the first one is looked at.
     """
     path = Path(paths[0])
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
+    check_file(path)
     if path.suffix.lower() == ".npz":
         raise DataError(
             f"{path}: a map is proposed for columns in text alone: write one ({_PAGE}) and name it by --map"

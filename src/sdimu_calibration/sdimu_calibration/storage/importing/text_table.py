@@ -35,6 +35,14 @@ _MOST_HEADINGS = 10
 """Number of numeric heading lines at most: what is longer is a table of its own."""
 
 
+def check_file(path: Path) -> None:
+    """Refuse what is no file to import."""
+    if path.is_dir():
+        raise DataError(f"{path}: is a folder: name the files in it (a folder that is a bag is read without an import)")
+    if not path.is_file():
+        raise DataError(f"{path}: no such file")
+
+
 class TextTable:
     """Columns of a text file, found by number (from 1) or by heading.
 
