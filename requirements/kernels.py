@@ -84,4 +84,6 @@ def simulate() -> None:
 
 
 if __name__ == "__main__":
-    {"fit": fit, "simulate": simulate}[sys.argv[1]]()
+    parts = {"fit": fit, "simulate": simulate}
+    for part in sys.argv[1:] or parts:
+        parts[part]()

@@ -19,13 +19,15 @@ APART = (
     "test/mutation/test_mutations.py",
     "test/sdimu_calibration/core/joint/test_static_sets.py",
 )
-"""Files of long tests that share nothing: each test goes to the worker that is free."""
+"""Files of long tests that share nothing: their tests may go to any worker."""
 
 LONGEST = (
     "test/book/test_blocks.py",
     "test/sdimu_calibration/cli/test_terminal.py",
     "test/recovery/test_faults.py",
     "test/recovery/test_grades.py",
+    "test/mutation/test_mutations.py",
+    "test/sdimu_calibration/core/joint/test_static_sets.py",
     "test/ros/test_live_diagnosis.py",
     "test/ros/test_layouts.py",
     "test/ros/test_ros_machine.py",

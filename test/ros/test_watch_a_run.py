@@ -55,6 +55,7 @@ def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     run, watch = None, sdimu("watch")
     try:
         assert watch.stdout is not None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _LOOK_S = 0.5
-"""Time between two looks for a run that has begun (s): nobody waits for it."""
+"""Time between two looks for a run that has begun (s): short beside the start of its nodes."""
 
 
 @with_options
@@ -37,7 +37,12 @@ def watch(
         typer.Option(min=0, max=232, help="ROS domain; ROS_DOMAIN_ID, or that of the sdimu run on this machine."),
     ] = None,
     seconds: Annotated[
-        float, typer.Option("--for", min=0.0, help="Wall time to watch (s); 0 ends with the test, or with Ctrl-C.")
+        float,
+        typer.Option(
+            "--for",
+            min=0.0,
+            help="Wall time to watch, and at most to wait for a run (s); 0 ends with the test, or with Ctrl-C.",
+        ),
     ] = 0.0,
     add: Annotated[
         list[str] | None,
@@ -51,22 +56,18 @@ def watch(
     from contextlib import closing
 
     from sdimu_calibration.cli.console import console as make_console
-    from sdimu_calibration.cli.processes import enter_domain, stated_domain
     from sdimu_calibration.report.live_page.record import LiveRecord
 
     page.check()
     test = watched(domain)
-    if test is None and domain is None and stated_domain() is None:
-        _wait_for_one(make_console(), seconds)
     outline, first = _outline(test, model, tuple(add or ()))
-    if test is not None:
-        enter_domain(test.domain)
-    used = _entered(domain)
+    waited = test is None and _waited(domain, make_console(), seconds)
+    used = _entered(domain, test)
     # The domain is read when ROS is loaded.
     from sdimu_calibration.nodes.monitor import Monitor
 
     console, begun = make_console(), time.monotonic()
-    for line in opening_words(test, used, seconds):
+    for line in opening_words(test, used, seconds)[: 1 if waited else None]:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     start_ns = None if test is None else test.start_ns
     record = LiveRecord(outline, "" if test is None else test.folder)
@@ -75,7 +76,7 @@ def watch(
             raise DataError(f"--add {' '.join(add)}: {why}")
         shown.begin()
         watching = _Watching(console, monitor, outline, record)
-        is_over = _follow(watching, used if test is not None else None, seconds)
+        is_over = _follow(watching, None if test is None else used, seconds)
         if not monitor.progress.heard:
             raise DataError(
                 f"ROS domain {used}: nothing heard in {time.monotonic() - begun:.0f} s (is a test running? "
@@ -87,10 +88,11 @@ def watch(
         console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
 
 
-def _wait_for_one(console: Console, seconds: float) -> None:
-    """Wait until a run of `sdimu` begins on this machine, and begin anew; or until ROS domain 0 has a test.
+def _waited(domain: int | None, console: Console, seconds: float) -> bool:
+    """Wait until ROS domain 0 has a test, True then; False at once where a domain is stated.
 
-    Anew in this process's place: ROS reads the domain and its settings as it is loaded.
+    Where a run of `sdimu` begins on this machine, watching begins anew in the place of this process: ROS reads the
+    domain and its settings as it is loaded.
 
     Raises
     ------
@@ -102,6 +104,10 @@ def _wait_for_one(console: Console, seconds: float) -> None:
     import time
     from contextlib import closing
 
+    from sdimu_calibration.cli.processes import stated_domain
+
+    if domain is not None or stated_domain() is not None:
+        return False
     from sdimu_calibration.nodes.monitor import Monitor
 
     console.print(
@@ -113,11 +119,11 @@ def _wait_for_one(console: Console, seconds: float) -> None:
     begun = time.monotonic()
     with closing(Monitor()) as monitor:
         while watched(None) is None:
-            if monitor.listen(_LOOK_S).heard:
-                return
+            if monitor.listen(_LOOK_S).is_test:
+                return True
             if seconds and time.monotonic() - begun > seconds:
                 raise DataError(f"no run of sdimu began in {seconds:g} s, and ROS domain 0 is silent: state --domain")
-    os.execv(sys.executable, [sys.executable, "-m", "sdimu_calibration.cli.main", *sys.argv[1:]])
+    return os.execv(sys.executable, [sys.executable, "-P", "-m", "sdimu_calibration.cli.main", *sys.argv[1:]])
 
 
 def opening_words(test: RunningTest | None, domain: int, seconds: float) -> tuple[str, ...]:
@@ -191,11 +197,14 @@ def watched(domain: int | None) -> RunningTest | None:
     return tests[0] if tests else None
 
 
-def _entered(domain: int | None) -> int:
-    """Domain that ROS will use, once it is loaded."""
+def _entered(domain: int | None, test: RunningTest | None) -> int:
+    """Domain that ROS will use, once it is loaded: that of a run of `sdimu`, or the stated one."""
     import os
 
-    from sdimu_calibration.cli.processes import DOMAIN_VARIABLE, stated_domain
+    from sdimu_calibration.cli.processes import DOMAIN_VARIABLE, enter_domain, stated_domain
+
+    if test is not None:
+        enter_domain(test.domain)
 
     if domain is not None:
         os.environ[DOMAIN_VARIABLE] = str(domain)

@@ -70,6 +70,11 @@ class Progress:
     ladders: dict[int, Rows] = field(default_factory=dict)
     choices: list[SeenChoice] = field(default_factory=list)
 
+    @property
+    def is_test(self) -> bool:
+        """Whether what was heard comes from a table or a calibration: /diagnostics has every robot."""
+        return self.phase != "starting" or bool(self.sigmas)
+
 
 class Monitor:
     """Listens to a running test inside the process that shows it; close it after use.

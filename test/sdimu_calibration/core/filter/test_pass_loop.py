@@ -34,7 +34,7 @@ def step(at: StartPoint, left: float) -> Step:
     return Step(at.C_nb, state, state, None, None, at.coefficients)  # type: ignore[arg-type]
 
 
-def passes(ending: Ending, loose: bool, left: float = 0.5):
+def passes(ending: Ending, loose: bool, left: float = 0.5, begin=(0.0, 0.0)):
     seen: list[bool] = []
 
     def run(at: StartPoint, before: Step | None, free: bool) -> Step:
@@ -42,8 +42,8 @@ def passes(ending: Ending, loose: bool, left: float = 0.5):
         seen.append(free)
         return step(at, left)
 
-    begin = StartPoint(np.eye(3), np.zeros(len(TRUTH)))
-    return *until_nothing_moves(run, begin, loose, ending, lambda *_: None), seen
+    at = StartPoint(np.eye(3), np.array(begin))
+    return *until_nothing_moves(run, at, loose, ending, lambda *_: None), seen
 
 
 def test_each_pass_goes_on_where_the_one_before_ended():
@@ -73,3 +73,9 @@ def test_passes_that_run_out_converged_where_they_were_near(near: float, converg
 def test_position_and_velocity_are_taken_in_after_some_passes_whatever_moves():
     *_, seen = passes(Ending(5, 0.0, 2, 1, 0.0), loose=True, left=0.9)
     assert seen == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize("least", [1, 2, 3])
+def test_passes_with_position_and_velocity_are_as_many_as_asked_at_least(least: int):
+    _, count, converged, _ = passes(Ending(20, 1.0, 20, least, 0.0), loose=False, begin=TRUTH)
+    assert (count, converged) == (least, True)

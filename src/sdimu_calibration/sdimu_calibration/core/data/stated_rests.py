@@ -145,7 +145,7 @@ def without_spans(recording: Recording, rests: StaticIntervals, spans: Spans) ->
 
 def _refuse_beyond(recording: Recording, begin: float, end: float) -> None:
     if not begin < end:
-        raise DataError(f"times left out: {begin:g}-{end:g} s ends before it begins (expected BEGIN-END)")
+        raise DataError(f"times left out: {begin:g}-{end:g} s is empty or backwards (expected BEGIN-END)")
     if begin > recording.t[-1]:
         raise DataError(
             f"times left out: {begin:g}-{end:g} s begins after the recording, which is {recording.t[-1]:.0f} s long"

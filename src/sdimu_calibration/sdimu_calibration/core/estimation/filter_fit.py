@@ -74,7 +74,7 @@ class FilterFit(NavigationFit):
         constant = self.setup.sensors.decay_rate == 0.0
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate * constant)
         solution = solve_filter(self.setup, prepared, begin, silent)
-        return replace(self, prepared=prepared, solution=solution, noise=None)
+        return replace(self, setup=solution.setup, prepared=prepared, solution=solution, noise=None)
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
         """Take the errors out of all cycles, to first order."""

@@ -214,7 +214,8 @@ class NavigationFit(Fit):
     def _drifts(self) -> dict[str, tuple[int, float]]:
         """Channel of each drift of a bias, and the mean of its regressor over all dwells (SI)."""
         out = {}
-        for effect in (effect for effect in self.setup.sensors.effects if effect.bias_drift):
+        drifting = [effect for effect in self.setup.sensors.effects if effect.bias_drift]
+        for effect in drifting:
             for mean, term in zip(self.dwell_means(effect).tolist(), effect.terms, strict=True):
                 out[effect.parameters[term.parameter].name] = (term.channel, mean)
         return out

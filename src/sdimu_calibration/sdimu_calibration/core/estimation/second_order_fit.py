@@ -82,7 +82,9 @@ class SecondOrderFit(NavigationFit):
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
         solution = solve_second_order(self.setup, prepared, alignment, begin, silent)
-        return replace(self, prepared=prepared, alignment=alignment, solution=solution, noise=None)
+        return replace(
+            self, setup=solution.setup, prepared=prepared, alignment=alignment, solution=solution, noise=None
+        )
 
     def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
         """Take the errors out of all cycles, exactly; all coefficients are constants, wherever the fit ended."""

@@ -75,7 +75,7 @@ class Ending:
     settled : float
         Movement of a coefficient (sigma) from which position and velocity are taken in.
     most_loose : int
-        Number of passes from which they are taken in whatever moves.
+        Number of the last pass after which another one may be made without them; then they are taken in whatever moves.
     least : int
         Number of passes with both at least.
     near : float

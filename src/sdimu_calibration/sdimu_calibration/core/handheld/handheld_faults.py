@@ -70,7 +70,10 @@ def _stepped(recording: Recording, run: HandheldRun) -> list[DataFault]:
     out = []
     for step in recording.clock_steps:
         cycle, _ = open_angle(step, run.cycles)
-        out.append(step_fault(step, not np.any((run.first <= cycle) & (cycle < run.last))))
+        turn = (run.first <= cycle) & (cycle < run.last)
+        told = step_fault(step, not np.any(turn))
+        unseen = bool(np.any(run.unseen & turn))
+        out.append(replace(told, text=f"{told.text}; the turn says nothing") if unseen else told)
     return out
 
 

@@ -20,8 +20,8 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Option
 
 SHARE = 0.3
-"""What one unit differs by from recording to recording (share of the size that the IMU file gives): data sheets state a
-repeatability of a tenth and less."""
+"""What one unit differs by from recording to recording at most (share of the size that the IMU file gives): three times
+the repeatability of data sheets, which is a tenth and less."""
 _ODDS = 7.0
 """Log odds (1) from which a recording is refused as of another unit: a thousand to one."""
 _APART_K = 10.0
