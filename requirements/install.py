@@ -95,9 +95,8 @@ def to_bytecode() -> None:
 
 def start_kernels() -> None:
     """Begin to compile loops, beside all else; what it does not come to is compiled when it is used first."""
-    for part in ("fit", "simulate"):
-        command = [sys.executable, str(FOLDER / "kernels.py"), part]
-        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    command = [sys.executable, str(FOLDER / "kernels.py")]
+    subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def main(names: Sequence[str]) -> int:

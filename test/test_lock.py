@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import re
-import runpy
 import subprocess
 import sys
 from importlib.metadata import requires
 from pathlib import Path
 
-import numba
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-
-from sdimu_calibration.core.filter import filter_pass, passes
-from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.core.planning.predict import predict
-from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 
 ROOT = Path(__file__).resolve().parents[1]
 FILES = ("run", "extras", "campaigns", "test", "build", "docs")
@@ -77,28 +70,6 @@ def test_loops_are_compiled_before_ros_is_there():
     assert {"numba", "numpy", "scipy", "pydantic", "pyyaml"} <= first
     for name in sorted(first):
         assert not [text for text in requires(name) or [] if text.startswith("ros-")], name
-
-
-def test_parts_are_compiled_for_the_types_with_which_the_pass_of_the_filter_calls_them(monkeypatch):
-    """Another layout would compile a loop that nobody calls, and the pass would compile its own all the same."""
-    parts = runpy.run_path(str(ROOT / "requirements" / "kernels.py"))["PARTS"]
-    found: dict[str, set[tuple[object, ...]]] = {}
-
-    def telling(function):
-        def call(*arguments):
-            found.setdefault(function.__name__, set()).add(tuple(map(numba.typeof, arguments)))
-            return function(*arguments)
-
-        return call
-
-    for function, _ in parts:
-        monkeypatch.setattr(filter_pass, function.__name__, telling(function))
-    monkeypatch.setattr(passes, "run_pass", filter_pass.run_pass.py_func)
-    plan = Plan("two stops", (15.0, 10.0), (Turn("X", 1.0, 0.5),), 1.0)
-    prediction = predict(plan, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
-    assert len(prediction.sigma)
-    for function, types in parts:
-        assert found[function.__name__] == {tuple(types)}, function.__name__
 
 
 TOOLS = {
