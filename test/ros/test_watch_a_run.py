@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
+from subprocess import Popen
 
 import pytest
 
@@ -23,6 +24,17 @@ def told(text: str, stop: int) -> tuple[str, str]:
     return f"{place}; {when.partition(',')[0]}", sigma
 
 
+def both_ended(run: Popen[str], watch: Popen[str], folder: Path) -> tuple[str, str]:
+    """What a run and the one that watched it have printed, once both have ended as they should."""
+    seen, wrong = watch.communicate(timeout=DEADLINE_S)
+    assert (watch.returncode, wrong) == (0, "")
+    done, err = run.communicate(timeout=DEADLINE_S)
+    assert run.returncode in (0, 3), err
+    assert f"the run into {folder}" in seen
+    assert "the test has ended" in seen
+    return done, seen
+
+
 def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Locks of this test alone: other runs on this machine are not meant.
     monkeypatch.setenv("TMPDIR", str(tmp_path))
@@ -35,16 +47,11 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, mo
             assert time.monotonic() - begun < DEADLINE_S
             time.sleep(0.2)
         watch = sdimu("watch", "--add", EFFECT)
-        seen, wrong = watch.communicate(timeout=DEADLINE_S)
-        assert (watch.returncode, wrong) == (0, "")
-        done, err = run.communicate(timeout=DEADLINE_S)
-        assert run.returncode in (0, 3), err
+        done, seen = both_ended(run, watch, tmp_path / "run")
     finally:
         for process in (run, watch):
             if process is not None:
                 process.kill()
-    assert f"the run into {tmp_path / 'run'}" in seen
-    assert "the test has ended" in seen
     for stop in (1, 2):
         one, other = (re.sub(r"\d+ of", "of", told(text, stop)[0]) for text in (done, seen))
         assert one == other
@@ -62,13 +69,8 @@ def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, monkeypatch: p
         assert watch.stdout.readline().startswith("no sdimu run on this machine yet: waiting for one")
         plan = write_plan(tmp_path / "plan.yaml", 20.0)
         run = sdimu("run", "--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--out", tmp_path / "run")
-        seen, wrong = watch.communicate(timeout=DEADLINE_S)
-        assert (watch.returncode, wrong) == (0, "")
-        _, err = run.communicate(timeout=DEADLINE_S)
-        assert run.returncode in (0, 3), err
+        both_ended(run, watch, tmp_path / "run")
     finally:
         for process in (run, watch):
             if process is not None:
                 process.kill()
-    assert f"the run into {tmp_path / 'run'}" in seen
-    assert "the test has ended" in seen

@@ -109,12 +109,12 @@ class InUse:
         """What the distances are, and of which compensations."""
         return (
             f"position after {self.minutes:.0f} min without aid, over {self.where} that no fit has seen: "
-            f"{', '.join(self.names)}{self._expected}"
+            f"{', '.join(self.names)}{self.expected}"
         )
 
     @property
-    def _expected(self) -> str:
-        """What the last fit predicted, and whether what it found fails beyond the data it is made of."""
+    def expected(self) -> str:
+        """End of a sentence: what the last fit predicted, and whether what was found fails beyond the data it is of."""
         if not np.isfinite(self.promised):
             return ""
         told = f"; the last fit predicted {metres(self.promised)}"

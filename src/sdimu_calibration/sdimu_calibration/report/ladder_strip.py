@@ -32,7 +32,7 @@ def ladder_strip(summary: DiagnosisSummary, more: ReportExtras | None) -> str:
     if use is not None:
         columns.insert(1, f"position after {use.minutes:.0f} min")
         rows.insert(0, [use.names[0], metres(use.distance[0]), ""])
-        told.insert(0, f"Position without aid, over {use.where} that no fit has seen.")
+        told.insert(0, f"Position without aid, over {use.where} that no fit has seen{use.expected}.")
     return grid(columns, rows, {0}) + quiet(" ".join(told))
 
 

@@ -25,7 +25,7 @@ def test_cosines_have_the_covariance_of_simulated_noise():
     drawn = noise @ wave.T * (2.0 / per)
     root = _root([NoiseTerm("gyro", FLICKER, 0.0, size)], "gyro", LENGTH_S, LENGTH_S * count)
     said = np.diag(root @ root.T)
-    # Four standard deviations of a variance of 1200 draws, and the ripple of either sum of Markov terms.
+    # Four standard deviations of a variance of 1200 draws, and a ripple of 2 % of either sum of Markov terms.
     assert drawn.var(axis=0) == pytest.approx(said, rel=4.0 * np.sqrt(2.0 / (3 * count)) + 0.04)
 
 

@@ -1,7 +1,7 @@
 """Configuration files (YAML) <-> the core's dataclasses.
 
-A file is named by a path, or by its bare name in ``config/<kind>/``. Quantities are text with a unit
-(``"2 deg/s"``); every other spelling is refused with one line that names file and key.
+A file is named by a path, or by its bare name in ``config/<kind>/`` or, where that has none, in the working directory.
+Quantities are text with a unit (``"2 deg/s"``); every other spelling is refused with one line that names file and key.
 """
 
 from __future__ import annotations
