@@ -62,8 +62,8 @@ MUTANTS = (
     ),
     Mutant(
         "posterior/prior.py",
-        "np.log(len(base) + 1.0) - np.log1p(1.0 / MEAN_NUMBER)",
-        "np.log(len(base) + 2.0) - np.log1p(1.0 / MEAN_NUMBER)",
+        "np.log(self.named(base) + 1.0)",
+        "np.log(self.named(base) + 2.0)",
         (f"{TESTS}/posterior",),
     ),
     Mutant(

@@ -14,6 +14,7 @@ THOROUGH = {
     "test/book/test_blocks.py": "runs README and tutorials as they stand",
     "test/browser": "drives Chromium",
     "test/mutation": "damages 40 files of every format",
+    "test/sdimu_calibration/core/diagnosis/test_unknown_attitude.py": "diagnoses of several rounds",
     "test/recovery/test_faults.py": "every fault of the data at every size",
     "test/recovery/test_grades.py": "every IMU file, from samples to result",
     "test/test_wheels.py": "builds and unpacks the wheels",

@@ -55,21 +55,31 @@ def log_posterior(W: np.ndarray, e: np.ndarray, known: Prior, members: tuple[tup
     columns = [k for k, _ in members]
     share = sum(np.log(WIDTH_SHARES[width]) for _, width in members)
     count = len(columns)
-    number = np.sum(np.log(np.arange(1, count + 1))) - count * np.log1p(1.0 / MEAN_NUMBER)
+    # Equations that no physics names do not make others likelier.
+    named = np.count_nonzero(~known.own[columns])
+    number = np.sum(np.log(np.arange(1, named + 1))) - count * np.log1p(1.0 / MEAN_NUMBER)
     kin = sum(KIN for k in range(count) if known.cause[columns[k]] in known.cause[columns[:k]])
     return float(density + share + known.log_share[columns].sum() + number + kin)
 
 
-@pytest.mark.parametrize("members", [(), ((1, 0),), ((0, 1), (3, 0)), ((0, 0), (1, 2), (4, 1))])
-def test_a_score_is_the_log_posterior(members):
-    rng, known = np.random.default_rng(1), prior(6)
+EQUATIONS = (np.zeros(6, dtype=bool), np.array([False, False, False, True, True, False]))
+"""None of the candidates is an equation; two are."""
+
+
+@pytest.mark.parametrize("own", EQUATIONS, ids=("catalogue", "equations"))
+@pytest.mark.parametrize(
+    "members", [(), ((1, 0),), ((0, 1), (3, 0)), ((0, 0), (1, 2), (4, 1)), ((3, 0), (4, 1), (5, 0))]
+)
+def test_a_score_is_the_log_posterior(members, own):
+    rng, known = np.random.default_rng(1), prior(6, own=own)
     W = drawn(6, rng)
     e = W[:, 3] * 2.0 + rng.standard_normal(ROWS)
     assert data_of(W, e, known).at(members).score == pytest.approx(log_posterior(W, e, known, members), abs=1e-9)
 
 
-def test_every_move_has_the_score_of_the_model_that_it_leads_to():
-    rng, known = np.random.default_rng(2), prior(6)
+@pytest.mark.parametrize("own", EQUATIONS, ids=("catalogue", "equations"))
+def test_every_move_has_the_score_of_the_model_that_it_leads_to(own):
+    rng, known = np.random.default_rng(2), prior(6, own=own)
     W = drawn(6, rng)
     data = data_of(W, W[:, 1] - 2.0 * W[:, 4] + rng.standard_normal(ROWS), known)
     here = data.at(((1, 0), (4, 1)))

@@ -20,13 +20,14 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import Search, search, with_steps
+from sdimu_calibration.core.diagnosis.unknown_attitude import with_attitude_functions
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
 from sdimu_calibration.core.progress import Progress
 
 UNEXPLAINED_P = 1e-3
@@ -86,22 +87,23 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     done : Round
         As of `search_until_stable`.
     """
-    done = search_until_stable(request, progress)
+    request, done = search_until_stable(request, progress)
     if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
         return request, done
     wander = wander_in(request.base.bare, done.found.noise)
     if wander.inner is None:
         return request, done
-    again = replace(request, wander=wander)
-    return again, search_until_stable(again, progress)
+    return search_until_stable(replace(request, wander=wander), progress)
 
 
-def search_until_stable(request: Request, progress: Progress) -> Round:
+def search_until_stable(request: Request, progress: Progress) -> tuple[Request, Round]:
     """Repeat rounds until the choice stands, then fit it in its noise.
 
     Returns
     -------
-    Round
+    request : Request
+        With functions of the attitude in its wander, where these were looked for.
+    done : Round
         The last one; its fit holds what it chose.
     """
     ground = _first_ground(request, progress)
@@ -114,9 +116,10 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
         if done.wants_equations and not own and not asked:
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
+            request = with_attitude_functions(request, done.found)
             wider = next_ground(request, ground.fit, ground.tried, True, done.found, ground.free)
             wide = run_round(request, wider, True, limits, done)
-            if any(c.family == "own" for c in wide.chosen):
+            if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
                 done, own = wide, True
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
         if stood:
@@ -128,7 +131,7 @@ def search_until_stable(request: Request, progress: Progress) -> Round:
     # Before the fit: its noise has the intervals that are stated here.
     done = replace(done, found=replace(with_steps(done.found), stood=stood))
     fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
-    return replace(done, fit=fit)
+    return request, replace(done, fit=fit)
 
 
 def _first_ground(request: Request, progress: Progress) -> Ground:

@@ -95,6 +95,9 @@ def search(
     tell_noise : bool
         Noise with a memory is told; without it is a rival of effects alone, for a fit that learns its scatter as white.
     """
+    if earlier and earlier.joint and earlier.joint.wander is not wander:
+        # Of other stretches neither information nor kinds of noise hold.
+        earlier = None
     joint = earlier.joint if earlier else None
     found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None)
     board = found.board

@@ -82,9 +82,9 @@ class Wander:
     Attributes
     ----------
     cut : Stretches
-        n stretches.
+        n cells.
     U : ndarray, shape (N, 6 n)
-        Signatures; column ``6 stretch + channel``.
+        Signatures; column ``6 cell + channel``.
     learned : tuple of NoiseTerm or None
         Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked.
     inner : InnerNoise or None
@@ -158,13 +158,26 @@ class Wander:
         cut = replace(cut, conditions=evidence.conditions(cut))
         return cls(cut, evidence.constant_signature(cut), inner=evidence.inner)
 
+    def with_functions(self, evidence: LinearEvidence) -> Wander:
+        """Return the same with functions of the attitude behind its stretches; itself where nobody knows that.
+
+        Parameters
+        ----------
+        evidence : LinearEvidence
+            N rows of the test, whitened as U is.
+        """
+        functions = evidence.attitude_functions()
+        if functions is None or self.cut.functions is not None:
+            return self
+        # Roots that the stretches have worked out are shorter.
+        cut = replace(self.cut, functions=functions, _modes={})
+        return replace(self, cut=cut, U=np.hstack([self.U, evidence.signature(functions.effects())]))
+
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         """Work out independent modes of noise, those of which the data say nothing as a covariance of the means."""
         root = root_of(terms, self.cut)
         values, vectors = np.linalg.eigh(root.T @ self.square @ root)
-        share = np.where(self.cut.turning, 0.0, self.cut.end - self.cut.start)
-        share = share / share.sum()
-        mean = np.einsum("s,scr->cr", share, root.reshape(len(self.cut), 6, -1)) @ vectors
+        mean = np.einsum("s,scr->cr", self.cut.in_dwells, root.reshape(self.cut.cells, 6, -1)) @ vectors
         seen = values > _SEEN
         hidden = mean[:, ~seen]
         return Modes(self.U @ (root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
@@ -373,7 +386,7 @@ def _modes(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Float
     """Information on the modes of a term of unit size (m,), and their squared projections (m,)."""
     root = cut.mode(term.kind, term.tau)
     values, vectors = np.linalg.eigh(_projected(J, root))
-    y2 = (vectors.T @ (root.T @ d.reshape(len(cut), 3)).ravel()) ** 2
+    y2 = (vectors.T @ (root.T @ d.reshape(cut.cells, 3)).ravel()) ** 2
     return np.maximum(values, 0.0), y2
 
 
@@ -418,7 +431,7 @@ def given_terms(
         return J, d
     B = np.hstack([_times(blocks[triad, name], roots[name]) for name in taken])
     M = np.block([[_times(_times(blocks[b, a], roots[a]).T, roots[b]).T for a in taken] for b in taken])
-    y = np.concatenate([(roots[name].T @ information.part(name).reshape(len(cut), 3)).ravel() for name in taken])
+    y = np.concatenate([(roots[name].T @ information.part(name).reshape(cut.cells, 3)).ravel() for name in taken])
     M[np.diag_indices_from(M)] += 1.0
     X = np.linalg.solve(M, np.column_stack([B.T, y]))
     return J - B @ X[:, :-1], d - B @ X[:, -1]
@@ -440,13 +453,13 @@ def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
     ndarray, shape (6 n, r)
         SI.
     """
-    return np.hstack([_spread(_triad_root(terms, cut, triad), triad, len(cut)) for triad in TRIADS])
+    return np.hstack([_spread(_triad_root(terms, cut, triad), triad, cut.cells) for triad in TRIADS])
 
 
 def _triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> Floats:
     """Square root of the covariance of the terms of a triad for one of its sensors, shape (n, r)."""
     parts = [t.size * cut.mode(t.kind, t.tau) for t in terms if t.triad == triad and t.size > 0.0]
-    return np.hstack(parts) if parts else np.zeros((len(cut), 0))
+    return np.hstack(parts) if parts else np.zeros((cut.cells, 0))
 
 
 def _spread(root: Floats, triad: str, count: int) -> Floats:

@@ -17,6 +17,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import prior_size
+from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.information import Information
@@ -119,6 +120,10 @@ class LinearEvidence(ABC):
     def conditions(self, cut: Stretches) -> Conditions | None:
         """Give what an unknown error may follow in each stretch; None where nobody knows it."""
         del cut
+        return None
+
+    def attitude_functions(self) -> AttitudeFunctions | None:
+        """Give functions of the attitude for the test; None where nobody knows it in every sample."""
         return None
 
     def constant_signature(self, cut: Stretches) -> Floats:

@@ -18,6 +18,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions, attitude_functions
 from sdimu_calibration.core.evidence.conditions import Conditions, conditions
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
@@ -112,6 +113,10 @@ class NavigationEvidence(LinearEvidence):
     def conditions(self, cut: Stretches) -> Conditions:
         """Give what an unknown error may follow in each stretch."""
         return conditions(self.seen, cut.start, cut.end)
+
+    def attitude_functions(self) -> AttitudeFunctions:
+        """Give functions of the attitude, which the navigation knows in every cycle."""
+        return attitude_functions(self.seen, [(begin, end) for _, begin, end in self.times.stops])
 
 
 def timetable(prepared: PreparedData) -> Timetable:

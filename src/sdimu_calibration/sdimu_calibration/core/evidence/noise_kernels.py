@@ -16,8 +16,9 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term, Timetable
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.conditions import Conditions
-from sdimu_calibration.core.noise_term import FLICKER, FOLLOWS, MARKOV, RANDOM_WALK, SHIFT, TURN
+from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, FOLLOWS, MARKOV, RANDOM_WALK, SHIFT, TURN
 
 _LONGEST_S = 30.0
 """Longest stretch (s): flicker of data-sheet size moves within it by less than a tenth of the variance of white noise
@@ -36,7 +37,9 @@ is measured. Without those below two seconds, flicker above white noise left a t
 
 @dataclass(frozen=True)
 class Stretches:
-    """Stretches of a test, n of them, in the order of time.
+    """Stretches of a test, n of them, in the order of time; m functions of the attitude may stand behind them.
+
+    A cell is a stretch with a constant error, or a function of the attitude with its weight.
 
     Attributes
     ----------
@@ -47,6 +50,9 @@ class Stretches:
     turning : ndarray of bool, shape (n,)
     conditions : Conditions or None
         What an unknown error may follow; None where nobody knows it.
+    functions : AttitudeFunctions or None
+        m of them, which make up an unknown function of the attitude; None where that is taken as its mean over each
+        stretch.
     """
 
     start: Floats
@@ -54,11 +60,42 @@ class Stretches:
     interval: Ints
     turning: Bools
     conditions: Conditions | None = None
+    functions: AttitudeFunctions | None = None
     _modes: dict[tuple[str, float], Floats] = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self) -> int:
         """Return the number of stretches."""
         return len(self.start)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells, n + m."""
+        return len(self) + (0 if self.functions is None else len(self.functions))
+
+    @property
+    def in_dwells(self) -> Floats:
+        """Mean over all dwells of a unit error in each cell; of a function zero, as it is no part of the bias.
+
+        Returns
+        -------
+        ndarray, shape (n + m,)
+            Share of the time of all dwells (1).
+        """
+        share = np.where(self.turning, 0.0, self.end - self.start)
+        return np.concatenate([share / share.sum(), np.zeros(self.cells - len(self))])
+
+    def at_stretches(self, kind: str) -> Floats:
+        """Mean over each stretch of a unit error in each cell, as far as it follows what a kind of noise does.
+
+        Returns
+        -------
+        ndarray, shape (n, n + m)
+            (1).
+        """
+        n = len(self)
+        if kind == ATTITUDE and self.functions is not None and self.conditions is not None:
+            return np.hstack([np.zeros((n, n)), self.functions.at(self.conditions.force)])
+        return np.eye(n, self.cells)
 
     def mode(self, kind: str, tau: float) -> Floats:
         """Square root R of the kernel of a kind of noise, ``kernel = RR'`` but for its small modes.
@@ -72,14 +109,20 @@ class Stretches:
 
         Returns
         -------
-        ndarray, shape (n, r)
+        ndarray, shape (n + m, r)
             In the root of the unit of `kernel`.
         """
         if (kind, tau) not in self._modes:
-            values, vectors = np.linalg.eigh(kernel(kind, tau, self))
-            keep = values > _KEPT * values[-1]
-            self._modes[kind, tau] = np.asarray(vectors[:, keep] * np.sqrt(values[keep]))
+            self._modes[kind, tau] = self._root(kind, tau)
         return self._modes[kind, tau]
+
+    def _root(self, kind: str, tau: float) -> Floats:
+        n, m = len(self), self.cells - len(self)
+        if kind == ATTITUDE and m:
+            return np.vstack([np.zeros((n, m)), np.eye(m)])
+        values, vectors = np.linalg.eigh(kernel(kind, tau, self))
+        keep = values > _KEPT * values[-1]
+        return np.vstack([vectors[:, keep] * np.sqrt(values[keep]), np.zeros((m, int(keep.sum())))])
 
 
 def stretches(times: Timetable, share: float = 1.0) -> Stretches:

@@ -84,7 +84,8 @@ def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
     length = float(np.median((cut.end - cut.start)[~cut.turning]))
     edges = np.array([0.0, 0.5, 1.0]) * length
     halves = Stretches(edges[:2], edges[1:], np.zeros(2, dtype=np.int64), np.zeros(2, dtype=bool))
-    seen = np.einsum("ij,ij->j", wander.U, wander.U).reshape(len(cut), 2, 3)[~cut.turning]
+    U = wander.U[:, : 6 * len(cut)]
+    seen = np.einsum("ij,ij->j", U, U).reshape(len(cut), 2, 3)[~cut.turning]
     ratios = []
     for place, triad in enumerate(TRIADS):
         moved = sum(t.size**2 * _between(kernel(t.kind, t.tau, halves)) for t in terms if t.triad == triad)

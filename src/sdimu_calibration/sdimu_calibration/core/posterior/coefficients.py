@@ -121,8 +121,7 @@ class Averages:
                 self._noises[noise] = _Mean(np.zeros((6, len(self.board.keep))), np.zeros(6), np.zeros((6, 6)))
             else:
                 cut = wander.cut
-                share = np.where(cut.turning, 0.0, cut.end - cut.start)
-                G = np.einsum("s,scr->cr", share / share.sum(), one.R.reshape(len(cut), 6, -1))
+                G = np.einsum("s,scr->cr", cut.in_dwells, one.R.reshape(cut.cells, 6, -1))
                 self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
         return self._noises[noise]
 

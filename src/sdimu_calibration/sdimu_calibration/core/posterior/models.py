@@ -181,7 +181,7 @@ class Expansion:
         J, prior = self.data.J, self.data.prior
         more = prior.log_more(self.columns)
         # Odds of the second beside the first: k + 2 over k + 1, and its kin.
-        step = np.log((len(self.members) + 2.0) / (len(self.members) + 1.0))
+        step = np.log((prior.named(self.columns) + 2.0) / (prior.named(self.columns) + 1.0))
         # Two equations that no physics names are too many.
         use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0) & ~prior.own)
         if len(use) < 2:

@@ -252,8 +252,10 @@ def posterior(
     named = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
     # About another point two of a start may be one, or a size have the other sign: that is no model any more.
     starts = [one for one in dict.fromkeys(named) if np.isfinite(board.data(NoiseModel())[1].at(one).score)]
-    tried = None if before is None else before.tried
-    settled = before is not None and len(starts) > 0
+    # Functions of the attitude stand in the place of many effects: no search from these leads there.
+    wide = before is None or (wander is not None and wander.cut.functions is not None)
+    tried = before.tried if before is not None and not wide else None
+    settled = not wide and len(starts) > 0
     noises, members, beside = _climbed(board, starts or [()], tried, settled)
     asked: set[str] = set()
     sharpened = 0

@@ -5,8 +5,10 @@ and each candidate has its share of it. Integrated over the rate,
 
     log pi(S) = sum_j log u_j + log k! - (k + 1) log(1 + b) + log b,   k = |S|,  b = 1 / MEAN_NUMBER,  sum u_j = 1
 
-so that a sensor with k effects is likelier to have one more (k + 1 times the odds of the first one). Source: J. Scott,
-J. Berger, "Bayes and empirical-Bayes multiplicity adjustment", Annals of Statistics 38 (2010).
+so that a sensor with k effects is likelier to have one more (k + 1 times the odds of the first one). Equations that no
+physics names do not count in k: a sensor that has some is not likelier to have others. Several at once are more often
+the parts of one function, which is tried by itself. Source: J. Scott, J. Berger, "Bayes and empirical-Bayes
+multiplicity adjustment", Annals of Statistics 38 (2010).
 """
 
 from __future__ import annotations
@@ -82,6 +84,10 @@ class Prior:
         """Number of axes whose drifts are counted, and one for all that is no drift."""
         return int(self.drift.max(initial=-1)) + 2
 
+    def named(self, base: Sequence[int]) -> int:
+        """Count the candidates of a model that are no equations."""
+        return int(np.count_nonzero(~self.own[np.asarray(base, dtype=np.int64)]))
+
     def log_more(self, base: Sequence[int]) -> Floats:
         """Log odds of each candidate beside those of a model.
 
@@ -95,7 +101,8 @@ class Prior:
         ndarray, shape (q,)
             Log (1); -inf for those that the model has already.
         """
-        out = self.log_share + (np.log(len(base) + 1.0) - np.log1p(1.0 / MEAN_NUMBER))
+        out = self.log_share - np.log1p(1.0 / MEAN_NUMBER)
+        out[~self.own] += np.log(self.named(base) + 1.0)
         if len(base):
             at = np.asarray(base, dtype=np.int64)
             present, taken, twin = np.zeros(len(out)), np.zeros(len(out), dtype=bool), np.zeros(len(out), dtype=bool)
@@ -150,7 +157,8 @@ class Prior:
         if not all(distinct) or drifts.max(initial=0) > MOST_DRIFTS:
             return -np.inf
         kin = count - len(set(self.cause[at].tolist()))
-        number = float(np.log(np.arange(1.0, count + 1.0)).sum()) - count * float(np.log1p(1.0 / MEAN_NUMBER))
+        number = float(np.log(np.arange(1.0, self.named(at.tolist()) + 1.0)).sum())
+        number -= count * float(np.log1p(1.0 / MEAN_NUMBER))
         return float(self.log_share[at].sum()) + number + KIN * kin
 
 

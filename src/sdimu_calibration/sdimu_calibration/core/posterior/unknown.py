@@ -59,13 +59,13 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
     X = one.X[:, at]
     mode = one.u - X @ (covariance @ one.d[at])
     spread = one.inverse + X @ covariance @ X.T
-    share = np.where(cut.turning, 0.0, cut.end - cut.start)
-    share = share / share.sum()
+    share = cut.in_dwells[: len(cut)]
     out = []
     for term, columns in zip(terms, _columns(terms, [cut.mode(t.kind, t.tau).shape[1] for t in terms]), strict=True):
         if term.kind not in FOLLOWS:
             continue
-        R = one.R[:, columns].reshape(len(cut), 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
+        R = one.R[:, columns].reshape(cut.cells, 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
+        R = np.einsum("sn,ncr->scr", cut.at_stretches(term.kind), R)
         R = R - np.einsum("s,scr->cr", share, R)[None]
         variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
         x, mean = known.variable(term.kind), R @ mode[columns]
