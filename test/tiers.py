@@ -28,6 +28,9 @@ LONG = {
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py": (
         "test_no_physics_is_named_for_what_moves_within_stretches",
     ),
+    "test/sdimu_calibration/core/joint/test_function_fit.py": (
+        "test_it_changes_next_to_nothing_where_nothing_is_left",
+    ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_consumer-1]",
     ),

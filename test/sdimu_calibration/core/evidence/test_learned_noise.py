@@ -67,7 +67,7 @@ def test_a_kernel_is_the_mean_of_the_covariance_of_seconds(cut, kind):
 
 
 def test_an_error_that_follows_the_attitude_is_one_where_the_force_points_the_same_way(cut):
-    """Two stretches 17 deg apart share exp(-1/2) of the variance, opposite ones nothing, at any time between them."""
+    """Of its halves with 17 and 52 deg two stretches share by the square of their distance, at any time between them."""
     tilt = np.where(cut.interval % 4 == 0, 0.0, np.where(cut.interval % 4 == 2, 2.0 * np.arcsin(0.15), np.pi))
     force = np.column_stack([np.sin(tilt), np.zeros(len(cut)), np.cos(tilt)])
     seen = Conditions(force, np.zeros_like(force), np.zeros(len(cut)))
@@ -75,8 +75,10 @@ def test_an_error_that_follows_the_attitude_is_one_where_the_force_points_the_sa
     apart = np.abs(np.subtract.outer(tilt, tilt))
     same, near = apart < 1e-9, np.isclose(apart, 2.0 * np.arcsin(0.15))
     np.testing.assert_allclose(K[same], 1.0)
-    np.testing.assert_allclose(K[near], np.exp(-0.5))
-    assert K[~same & ~near].max() < 1e-8
+    np.testing.assert_allclose(K[near], 0.5 * (np.exp(-0.5) + np.exp(-0.5 / 9.0)))
+    opposite = np.isclose(apart, np.pi)
+    np.testing.assert_allclose(K[opposite], 0.5 * np.exp(-0.5 * (2.0 / 0.9) ** 2), rtol=1e-6)
+    assert K[~same & ~near].max() < 0.06
     np.testing.assert_array_equal(kernel(ATTITUDE, 0.0, cut), 1.0)
 
 

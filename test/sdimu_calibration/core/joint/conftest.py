@@ -104,11 +104,11 @@ def here(jobs: Sequence[Job]) -> list[Report | DataError]:
     return [tried(job) for job in jobs]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def options() -> SetOptions:
     return SetOptions(load_model("baseline"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def run() -> Callable[[Sequence[Job]], list[Report | DataError]]:
     return here

@@ -3,7 +3,7 @@
 The mean over a stretch is no such function where the IMU turns within it. Exact are m functions of the direction u of
 the specific force,
 
-    phi(u) = k(u, Z) L'^-1,   k(u, z) = exp(-|u - z|^2 / 2 l^2),   LL' = k(Z, Z),
+    phi(u) = k(u, Z) L'^-1,   LL' = k(Z, Z),
 
 whose sum with independent weights of unit variance has the covariance ``k(u, Z) k(Z, Z)^-1 k(Z, v)``: that of a
 Gaussian process seen through its values at knots Z, which are taken where the test has been.
@@ -23,11 +23,11 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS, Effect, Parameter, Term
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.evidence.conditions import SMOOTH, alike
+from sdimu_calibration.core.evidence.conditions import alike_attitudes
 
 _LEFT = 1e-3
 """Variance of the function (1) that the knots may leave anywhere: a thirtieth of its size."""
-_MOST = 90
+MOST = 90
 """Number of knots at most: so many cover the whole sphere."""
 _PLACES = 3000
 """Number of directions (1) among which knots are looked for: a turn of half a circle is cut into parts of 2 deg."""
@@ -66,8 +66,8 @@ class AttitudeFunctions:
         ndarray, shape (n, m)
             (1).
         """
-        square = alike(self.knots, self.knots, SMOOTH) + _ROUNDING * np.eye(len(self))
-        return np.asarray(np.linalg.solve(np.linalg.cholesky(square), alike(self.knots, direction, SMOOTH)).T)
+        square = alike_attitudes(self.knots, self.knots) + _ROUNDING * np.eye(len(self))
+        return np.asarray(np.linalg.solve(np.linalg.cholesky(square), alike_attitudes(self.knots, direction)).T)
 
     def effects(self) -> list[Effect]:
         """Give every sensor an error that is a sum of the functions; six parameters a function, in their order."""
@@ -108,8 +108,31 @@ def attitude_functions(seen: Motion, dwells: Sequence[tuple[float, float]]) -> A
     middle = seen.t - 0.5 * seen.dt
     rests = [every[(middle >= begin) & (middle <= end)].mean(axis=0) for begin, end in dwells]
     first = np.array(rests) / np.linalg.norm(rests, axis=1)[:, None]
-    path = every[:: max(1, len(every) // _PLACES)]
-    return AttitudeFunctions(np.vstack([first, path])[_knots(first, path)])
+    return covering(first, way(seen))
+
+
+def covering(first: Floats, path: Floats, most: int = MOST) -> AttitudeFunctions:
+    """Choose functions that make up any smooth function at all places.
+
+    Parameters
+    ----------
+    first, path : ndarray, shapes (d, 3), (n, 3)
+        Directions of force in b (1): those where knots are first, and all others.
+    most : int
+        Number of functions at most.
+    """
+    return AttitudeFunctions(np.vstack([first, path])[_knots(first, path, most)])
+
+
+def way(seen: Motion) -> Floats:
+    """Thin out the directions of force of a test, in b.
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        (1).
+    """
+    return directions(seen)[:: max(1, len(seen.t) // _PLACES)]
 
 
 def directions(motion: Motion) -> Floats:
@@ -123,15 +146,15 @@ def directions(motion: Motion) -> Floats:
     return np.asarray(motion.f / np.linalg.norm(motion.f, axis=1)[:, None])
 
 
-def _knots(first: Floats, path: Floats) -> list[int]:
+def _knots(first: Floats, path: Floats, most: int) -> list[int]:
     """Numbers of the knots among `first` (d, 3), then among `path` (n, 3), each where most is left by those before."""
     places = np.vstack([first, path])
     left, root = np.ones(len(places)), np.zeros((len(places), 0))
     knots: list[int] = []
     for among in (slice(0, len(first)), slice(0, len(places))):
-        while len(knots) < _MOST and left[among].max() > _LEFT:
+        while len(knots) < most and left[among].max() > _LEFT:
             knot = int(np.argmax(left[among]))
-            column = alike(places, places[[knot]], SMOOTH)[:, 0] - root @ root[knot]
+            column = alike_attitudes(places, places[[knot]])[:, 0] - root @ root[knot]
             column /= np.sqrt(left[knot])
             root = np.column_stack([root, column])
             left = np.maximum(left - column**2, 0.0)

@@ -14,10 +14,10 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.noise_term import ATTITUDE, RATE, TEMPERATURE
 
-SMOOTH = 0.3
-"""Distance of two directions of force (1) over which an unknown function of them changes: 17 deg, less than what lies
-between two attitudes of a plan. Sines of 5 to 9 rad a unit are ten times as likely with it as with half as much again;
-slower ones are as good as sums of powers, which are equations."""
+_SMOOTH = (0.3, 0.9)
+"""Distances of two directions of force (1) over which an unknown function of them changes, half of its variance each:
+17 deg is less than what lies between two attitudes of a plan, and finer waves are ten times as likely with it as with
+half as much again; 52 deg gives a function that a coefficient takes up in part the size that it may have."""
 _RATES = 0.3
 """Share of the largest rate (1) over which an unknown function of the rate changes: the senses of a turn lie apart, and
 so do 2 and 10 deg/s."""
@@ -83,28 +83,31 @@ class Conditions:
         """
         x = self.variable(kind)
         if kind == ATTITUDE:
-            return alike(x, x, SMOOTH)
+            return alike_attitudes(x, x)
         if kind == TEMPERATURE:
-            return alike(x, x, _TEMPERATURES * float(np.ptp(x)))
+            return _alike(x, x, _TEMPERATURES * float(np.ptp(x)))
         reach = _RATES * float(np.linalg.norm(x, axis=1).max())
-        at_rest = alike(x, np.zeros((1, 3)), reach)[:, 0]
-        return alike(x, x, reach) - np.outer(at_rest, at_rest)
+        at_rest = _alike(x, np.zeros((1, 3)), reach)[:, 0]
+        return _alike(x, x, reach) - np.outer(at_rest, at_rest)
 
 
-def alike(x: Floats, y: Floats, reach: float) -> Floats:
-    """Covariance of a smooth function of unit variance at two lists of places.
+def alike_attitudes(u: Floats, v: Floats) -> Floats:
+    """Covariance of an unknown function of unit variance at two lists of directions of force in b.
 
     Parameters
     ----------
-    x, y : ndarray, shapes (n, k), (m, k)
-    reach : float
-        Distance over which the function changes, in the unit of the places.
+    u, v : ndarray, shapes (n, 3), (m, 3)
+        (1).
 
     Returns
     -------
     ndarray, shape (n, m)
         (1).
     """
+    return np.asarray(np.mean([_alike(u, v, reach) for reach in _SMOOTH], axis=0))
+
+
+def _alike(x: Floats, y: Floats, reach: float) -> Floats:
     apart = np.sum(x**2, axis=1)[:, None] + np.sum(y**2, axis=1)[None, :] - 2.0 * (x @ y.T)
     return np.asarray(np.exp(-0.5 * np.maximum(apart, 0.0) / reach**2))
 

@@ -113,7 +113,7 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
     run : callable
         Does the jobs.
     """
-    reports = _asked(fit, run)
+    reports = with_places(fit, run)
     fit = replace(fit, reports=tuple(reports))
     rows, own, members = [], [], []
     for name in fit.power_ons:
@@ -130,8 +130,8 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
     return _scaled(left.J[P:, P:], left.d[P:], [reports[k] for k in order], fit)
 
 
-def _asked(fit: SetFit, run: Run) -> list[Report]:
-    """Rows of the recordings about the joint estimate with an error in each dwell."""
+def with_places(fit: SetFit, run: Run) -> list[Report]:
+    """Ask for the rows of recordings about the joint estimate with an error in each dwell; of many, of some."""
     columns = [len(CHANNELS) * len(r.times.stops) for r in fit.reports]
     most = max(2, int(_MOST_COLUMNS // max(*columns, 1)))
     # Spread over the set where it holds more than are asked.

@@ -26,6 +26,7 @@ from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
+from sdimu_calibration.core.joint.shared_function import SharedFunction, function_rows
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
@@ -73,6 +74,8 @@ class Job:
         Also those of effects that are of one recording.
     stretches : bool
         Signatures of an error of each sensor in each dwell and turn, in place of candidates.
+    function : SharedFunction or None
+        Signatures of functions of the attitude in place of candidates, in noise that is learned beside them.
     about : mapping of str to float or None
         Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit.
     imu : ImuSpecification or None
@@ -94,6 +97,7 @@ class Job:
     start: Start | None = None
     noise: tuple[NoiseTerm, ...] | None = None
     stretches: bool = False
+    function: SharedFunction | None = None
 
 
 @dataclass(frozen=True)
@@ -227,6 +231,8 @@ def _report(job: Job, fit: Fit) -> Report:
     own = _local_candidates(fit) if job.with_local else []
     if job.stretches:
         found, places = stretch_rows(fit)
+    elif job.function is not None:
+        found, places = function_rows(fit, job.function), None
     else:
         found, places = reduced(fit.evidence([*shared, *own]), fit.noise_terms), None
     log = recording.temperature
@@ -281,6 +287,8 @@ def _named(found: Reduction, job: Job, shared: Sequence[Effect]) -> Reduction:
     name = job.member.name
     local = _local_names(job)
     count = sum(len(effect.parameters) for effect in shared)
+    if job.function is not None:
+        count = len(found.labels)
     labels = tuple(label if k < count else tagged(label, name) for k, label in enumerate(found.labels))
     return replace(found, names=tuple(tagged(n, name) if n in local else n for n in found.names), labels=labels)
 

@@ -15,7 +15,8 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
-from sdimu_calibration.core.joint.leftovers import leftovers
+from sdimu_calibration.core.joint.function_fit import with_function
+from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
@@ -143,6 +144,9 @@ def diagnose_set(
         after, findings = (set_outcome(found.after), _findings(found)) if found.local else (before, ())
         again = recurrence(leftovers(found.after, run))
         word = _verdict(findings, after, found.after, again)
+    if word == Verdict.UNEXPLAINED and again is not None and ATTITUDE in again.answer:
+        found = replace(found, after=with_function(found.after, again.sensors, run))
+        after, findings = set_outcome(found.after), _findings(found)
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)

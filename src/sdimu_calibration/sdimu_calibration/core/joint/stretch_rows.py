@@ -14,6 +14,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.attitude_functions import way
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -37,12 +38,15 @@ class Places:
         Direction of the mean specific force in b: a unit vector.
     temperature_degc : ndarray, shape (n,)
         Mean; NaN where none is recorded.
+    way : ndarray, shape (k, 3)
+        Directions of the specific force in b in dwells and turns (1).
     """
 
     start: Floats
     end: Floats
     up: Floats
     temperature_degc: Floats
+    way: Floats
 
     def __len__(self) -> int:
         """Return the number of dwells."""
@@ -99,7 +103,7 @@ def _places(evidence: LinearEvidence, cut: Stretches, log: TemperatureLog | None
         up[k] = force / float(np.linalg.norm(force))
         if log is not None and len(log.t):
             heat[k] = np.interp(np.linspace(begin, end, _READINGS), log.t, log.value).mean()
-    return Places(cut.start, cut.end, up, heat)
+    return Places(cut.start, cut.end, up, heat, way(motion))
 
 
 def _seen(evidence: LinearEvidence) -> Motion:

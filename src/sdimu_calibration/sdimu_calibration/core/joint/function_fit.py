@@ -1,0 +1,112 @@
+"""A joint fit with an unknown function of the attitude that all recordings have in common.
+
+Where what a set leaves unexplained comes back at the same attitude, it belongs to the sensor. The weights of the
+function are parameters of all recordings, and are integrated out of the coefficients; their size is the likeliest one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
+from sdimu_calibration.core.evidence.attitude_functions import covering
+from sdimu_calibration.core.joint.combine import Combination, JointEstimate, Rows
+from sdimu_calibration.core.joint.leftovers import with_places
+from sdimu_calibration.core.joint.member import Job, Report
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, columns_of, grouped_rows, with_own
+from sdimu_calibration.core.joint.shared_function import SharedFunction
+from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
+from sdimu_calibration.core.recording import DataError
+
+_MOST = 150
+"""Number of functions at most: several plans together cover more of the sphere than one."""
+_SIZES = np.geomspace(0.1, 1e4, 41)
+"""Ratios of the sizes that are tried to the one at which a function is seen at all: neighbours differ by a third."""
+_LEARNINGS = 2
+"""Number of times that each recording learns its noise beside the function: a third changes no size by a tenth."""
+
+
+def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> SetFit:
+    """Return the fit with its estimate beside an unknown function of the attitude; as it is in a run by hand.
+
+    Parameters
+    ----------
+    sensors : sequence of str
+        Those that have one.
+    run : callable
+        Does the jobs.
+    """
+    if any(r.estimator == HandheldFit.estimator for r in fit.reports):
+        return fit
+    places = [r.places for r in with_places(fit, run) if r.places is not None]
+    functions = covering(np.vstack([p.up for p in places]), np.vstack([p.way for p in places]), _MOST)
+    shared = SharedFunction(functions, tuple(c for c in CHANNELS if c in sensors), {})
+    reports = _asked(fit, shared, run)
+    for _ in range(_LEARNINGS):
+        shared = replace(shared, size=_sizes(fit, reports, shared))
+        reports = _asked(fit, shared, run)
+    shared = replace(shared, size=_sizes(fit, reports, shared))
+    return replace(fit, estimate=_estimated(fit, reports, shared))
+
+
+def _asked(fit: SetFit, shared: SharedFunction, run: Run) -> list[Report]:
+    """Ask for rows about the joint estimate with the functions, in noise learned beside them once they have a size."""
+    jobs = [
+        Job(
+            member,
+            fit.model,
+            report.estimator,
+            tuple(fit.local.get(member.name, ())),
+            about=fit.values_of(report),
+            imu=report.imu,
+            start=report.start,
+            noise=(),
+            function=shared,
+        )
+        for member, report in zip(fit.members, fit.reports, strict=True)
+    ]
+    reports = []
+    for fresh, old in zip(run(jobs), fit.reports, strict=True):
+        if isinstance(fresh, DataError):
+            raise fresh
+        reports.append(with_own(fresh, old))
+    return reports
+
+
+def _sizes(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:
+    """Likeliest size of each sensor (SI), one after the other; what is not seen gets one that changes little."""
+    p = len(fit.names)
+    seen = np.sum([np.sum(rows.A[:, p:] ** 2, axis=0) for rows in _rows(fit, reports, shared)], axis=0)
+    least = {sensor: float(np.median(seen[shared.of(sensor)])) ** -0.5 for sensor in shared.sensors}
+    found = replace(shared, size=least | dict(shared.size))
+    for sensor in shared.sensors:
+        tried = [replace(found, size={**found.size, sensor: least[sensor] * ratio}) for ratio in _SIZES]
+        found = max(tried, key=lambda one: _likelihood(fit, reports, one))
+    return dict(found.size)
+
+
+def _rows(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> list[Rows]:
+    return grouped_rows(reports, (*fit.names, *shared.labels))
+
+
+def _combined(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> Combination:
+    groups = _rows(fit, reports, shared)
+    components = columns_of(fit.varying, fit.names) if len(groups) > 1 else []
+    return Combination(groups, np.concatenate([fit.weight, shared.known]), components)
+
+
+def _likelihood(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> float:
+    """Log-likelihood of the sizes, the weights integrated out (1)."""
+    return _combined(fit, reports, shared).log_likelihood(fit.tau) + 0.5 * float(np.log(shared.known).sum())
+
+
+def _estimated(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> JointEstimate:
+    combined, p = _combined(fit, reports, shared), len(fit.names)
+    estimate = (
+        in_scatter(combined, turn_on_scatter(combined)) if combined.components else combined.estimate(np.empty(0))
+    )
+    return replace(estimate, values=estimate.values[:p], covariance=estimate.covariance[:p, :p])

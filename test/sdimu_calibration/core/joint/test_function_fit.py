@@ -1,0 +1,63 @@
+"""An unknown function of the attitude that the recordings of a set share leaves the sigmas of the joint fit right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.joint.function_fit import with_function
+from sdimu_calibration.core.joint.set_fit import SetFit, fit_set
+from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.plan import backwards
+from sdimu_sim.core.truth import in_body_frame
+
+from .conftest import here, short, unit_set
+
+FORTH = short("recommended", stops=28)
+HIDDEN = "accel_x: sin(2.1 fx/g - 2.24 fy/g + 5.5 fz/g)=40 ug"
+SEED = 6
+
+
+@pytest.fixture(scope="module")
+def unit():
+    """A unit with a wave of the attitude in accelerometer x, recorded forth and back."""
+    return unit_set(SEED, [FORTH, backwards(FORTH)], (HIDDEN,))
+
+
+@pytest.fixture(scope="module")
+def as_given(unit, options) -> SetFit:
+    return fit_set(unit.members, options, here)
+
+
+def z_of(fit: SetFit, unit) -> np.ndarray:
+    """Errors over sigma of all coefficients but the biases, which differ from power-on to power-on."""
+    told = set_outcome(fit)
+    truth = in_body_frame(unit.truth, told.body_frame)
+    sigma = np.sqrt(np.diag(told.covariance))
+    free = [
+        k
+        for k, name in enumerate(told.names)
+        if name in truth and "bias" not in name and name not in body_frame.pinned_names(told.body_frame)
+    ]
+    return np.array([(told.values[k] - truth[told.names[k]]) / sigma[k] for k in free])
+
+
+def test_coefficients_are_as_good_as_their_sigmas_say(unit, as_given):
+    z = z_of(with_function(as_given, ("accel_x",), here), unit)
+    assert np.sqrt(np.mean(z**2)) < 1.3
+    assert np.abs(z).max() < 4.0
+    # Without the function coefficients are off by many sigmas: what is tested is there.
+    assert np.abs(z_of(as_given, unit)).max() > 4.0
+
+
+def test_it_changes_next_to_nothing_where_nothing_is_left(options):
+    clean = fit_set(unit_set(SEED, [FORTH, backwards(FORTH)]).members, options, here)
+    beside = with_function(clean, ("accel_x",), here)
+    sigma = np.sqrt(np.diag(clean.estimate.covariance))
+    np.testing.assert_array_less(np.abs(beside.estimate.values - clean.estimate.values), sigma)
+    # It may be as large as the noise hides: in the coefficients of that accelerometer alone.
+    others = ~np.array([name.startswith("accel") and "x" in name.rpartition("_")[2] for name in clean.names])
+    grown = np.sqrt(np.diag(beside.estimate.covariance)) / sigma
+    np.testing.assert_array_less(grown[others], 1.1)
+    np.testing.assert_array_less(grown, 4.0)
