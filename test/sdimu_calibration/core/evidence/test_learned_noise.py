@@ -67,7 +67,7 @@ def test_a_kernel_is_the_mean_of_the_covariance_of_seconds(cut, kind):
 
 
 def test_an_error_that_follows_the_attitude_is_one_where_the_force_points_the_same_way(cut):
-    """Of its halves with 17 and 52 deg two stretches share by the square of their distance, at any time between them."""
+    """Two stretches share its halves by the square of their distance over 17 and 52 deg, at any time between them."""
     tilt = np.where(cut.interval % 4 == 0, 0.0, np.where(cut.interval % 4 == 2, 2.0 * np.arcsin(0.15), np.pi))
     force = np.column_stack([np.sin(tilt), np.zeros(len(cut)), np.cos(tilt)])
     seen = Conditions(force, np.zeros_like(force), np.zeros(len(cut)))
