@@ -83,7 +83,7 @@ def run(
 
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain, own_folder
-    from sdimu_calibration.core.compiled import never_compiled
+    from sdimu_calibration.core.compiled import still_to_compile
     from sdimu_calibration.report.live_page.record import LiveRecord
 
     _check_choosing(test.adaptive, test.ask, test.plan)
@@ -101,8 +101,8 @@ def run(
         with own_domain(out / "log", domain, about) as used, Children(out / "log") as children:
             _clear(out, test.followed, replace)
             console.print(f"ROS domain {used}", highlight=False)
-            if never_compiled():
-                console.print("compiling the numerical loops, once on this machine: about a minute without samples")
+            if still_to_compile():
+                console.print("compiling the numerical loops, once on this machine: up to a minute without samples")
             _start(children, options, out / "bag", replace)
             shown.begin()
             streamed = _watch(console, children, outline, record)
