@@ -2,7 +2,7 @@
 
 A file's tests stay on one worker, which makes its fixtures once. `pytest-xdist` hands out the files with most tests
 first, so a file of few long ones comes last, and one worker ends minutes after the other. Here the longest come first,
-and a file whose tests share no fixture is handed out test by test.
+a file whose tests share no fixture is handed out test by test, and files that share a long one stay together.
 """
 
 from __future__ import annotations
@@ -20,6 +20,12 @@ APART = (
     "test/sdimu_calibration/core/joint/test_static_sets.py",
 )
 """Files of long tests that share nothing: their tests may go to any worker."""
+
+TOGETHER = {
+    "test/ros/test_layouts.py": "test/ros/test_whole_run.py",
+    "test/ros/test_transforms.py": "test/ros/test_whole_run.py",
+}
+"""Files that go to the worker of another one, with which they share a whole run over DDS."""
 
 LONGEST = (
     "test/book/test_blocks.py",
@@ -56,7 +62,7 @@ LONGEST = (
 
 
 def scope_of(name: str) -> str:
-    """Name what stays on one worker with a test: its file, or the test alone.
+    """Name what stays on one worker with a test: its file, that of its fixture, or the test alone.
 
     Parameters
     ----------
@@ -64,7 +70,7 @@ def scope_of(name: str) -> str:
         Of the test, as pytest prints it.
     """
     file = name.partition("::")[0]
-    return name if file in APART else file
+    return name if file in APART else TOGETHER.get(file, file)
 
 
 def longest_first(items: Sequence[pytest.Item]) -> list[pytest.Item]:
