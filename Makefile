@@ -46,10 +46,15 @@ demo: $(RUN)
 
 # Style, types and the direction of imports.
 check: setup
+	$(MAKE) --no-print-directory -j 2 --output-sync=target check-style check-types
+
+check-style: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check -q .
-	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
+
+check-types: setup
+	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 
 # What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once;
 # the longest files come first (test/sharing.py). All tests run with the kernels of OpenBLAS for AVX2, on a machine that
@@ -149,4 +154,4 @@ lock: setup
 	$(BIN)/python requirements/lock.py
 	$(BIN)/python requirements/vendored.py
 
-.PHONY: setup demo check test thorough thorough-nodes thorough-rest other-blas colcon wheels bench study mutations mutants docs faults grades pictures campaigns lock
+.PHONY: setup demo check check-style check-types test thorough thorough-nodes thorough-rest other-blas colcon wheels bench study mutations mutants docs faults grades pictures campaigns lock

@@ -84,6 +84,19 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FitSessio
         yield FitSession(tmp_path, children)
 
 
+@pytest.fixture
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A domain for one run, which is found as the only one of this machine.
+
+    Its own locks are in a folder of this test, so that no other run is found. The domain is held where the others look,
+    too: two runs that took the same one would mix their samples.
+    """
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    with own_domain(tmp_path / "log") as domain:
+        monkeypatch.setenv("TMPDIR", str(tmp_path))
+        yield domain
+
+
 def imu_stamps(bag: Path) -> np.ndarray:
     """Stamps (ns) of the IMU samples in a bag, as recorded."""
     return decode_imu(raw_messages(bag, {"/imu/data_raw": IMU}, "/imu/data_raw")["/imu/data_raw"])[0]
