@@ -46,39 +46,51 @@ demo: $(RUN)
 
 # Style, types and the direction of imports.
 check: setup
+	$(MAKE) --no-print-directory -j 2 --output-sync=target check-style check-types
+
+check-style: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check -q .
-	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
 	$(BIN)/lint-imports
 
+check-types: setup
+	$(BIN)/mypy $(foreach package,$(PACKAGES),src/$(package)/$(package)) study/sdimu_study
+
 # What every change must pass at once: some minutes. A file's tests stay on one worker, which makes its fixtures once;
-# the longest files come first (test/sharing.py).
+# the longest files come first (test/sharing.py). All tests run with the kernels of OpenBLAS for AVX2, on a machine that
+# has others, too: the same digits wherever a test runs.
+test: export OPENBLAS_CORETYPE = Haswell
 test: check
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
 
 # The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
-# Nodes wait for each other more than they work: three at once. The kernels of OpenBLAS are those with AVX2, which
-# `other-blas` then leaves out of these.
+# Nodes wait for each other more than they work: they run beside what keeps both cores busy.
 thorough: export OPENBLAS_CORETYPE = Haswell
 thorough: setup
-	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and ros and not slow and not bench"
+	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest
+
+thorough-nodes: export SDIMU_FIRST_DOMAIN = 70
+thorough-nodes: setup
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench"
+
+thorough-rest: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
-# What linear algebra decides, with each of two kernels of OpenBLAS (with AVX2 and without AVX): no test stands on the last
-# digits of a library. `thorough` runs its share with AVX2.
+# What linear algebra decides, with other kernels of OpenBLAS (without AVX) than in `test` and `thorough`: no test stands on
+# the last digits of a library.
 NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain.py diagnosis/test_diagnose.py \
     estimation/test_inseparable.py estimation/test_prior_check.py evidence/test_influence.py evidence/test_signatures.py \
     filter/test_kalman.py fleet/test_population.py fleet/test_reml.py joint/test_combine.py joint/test_held_out.py \
     joint/test_reduction.py plan_search/test_known.py planning/test_observability.py test_probability.py) \
     test/ros/test_live_diagnosis.py::test_what_is_missing_stands_out_and_leaves_when_it_is_added
 
+other-blas: export OPENBLAS_CORETYPE = Nehalem
 other-blas: setup
-	OPENBLAS_CORETYPE=Haswell $(BIN)/python -m pytest -n 2 --dist loadfile \
-	    -m "not thorough and not slow and not bench" $(NUMERICAL)
-	OPENBLAS_CORETYPE=Nehalem $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not bench" $(NUMERICAL)
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not bench" $(NUMERICAL)
 
 # As a user of ROS would: build the three packages, test what was installed, and run a launch file of it outside the
-# repository (by the stand-in for ros2/launch, which is no wheel).
+# repository (by the stand-in for ros2/launch, which is no wheel). Its test of 19 s runs the loops as Python: to compile
+# them anew takes a minute, and test/ros/test_ros_machine.py does so in such an installation.
 colcon: setup
 	work=$$(mktemp -d) && trap 'rm -rf "$$work"' EXIT && \
 	test "$$(colcon --log-base $$work/log list --base-paths src | grep -c '(ros.ament_python)')" -eq $(NUMBER) && \
@@ -89,7 +101,7 @@ colcon: setup
 	    --pytest-args -q -m "not slow and not bench and not ros" && \
 	printf '%s\n' 'format: sdimu-plan/1' 'dwell: 8 s' 'rate: 30 deg/s' 'acceleration: 60 deg/s^2' \
 	    'turns: [{axis: Y, angle: 90 deg}]' > $$work/plan.yaml && cp test/ros/launch_stub.py $$work && cd / && \
-	ROS_DOMAIN_ID=97 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$$work/log $(CURDIR)/$(BIN)/python \
+	NUMBA_DISABLE_JIT=1 ROS_DOMAIN_ID=97 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$$work/log $(CURDIR)/$(BIN)/python \
 	    $$work/launch_stub.py $$work/install sdimu_sim simulation_launch.py plan:=$$work/plan.yaml out:=$$work/run \
 	    drive:=plan allow_motion:=true && test -s $$work/run/result.json
 
@@ -142,4 +154,4 @@ lock: setup
 	$(BIN)/python requirements/lock.py
 	$(BIN)/python requirements/vendored.py
 
-.PHONY: setup demo check test thorough other-blas colcon wheels bench study mutations mutants docs faults grades pictures campaigns lock
+.PHONY: setup demo check check-style check-types test thorough thorough-nodes thorough-rest other-blas colcon wheels bench study mutations mutants docs faults grades pictures campaigns lock

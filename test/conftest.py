@@ -28,9 +28,10 @@ from sdimu_calibration.storage.files.result_file import write_result
 START_NS = 1_700_000_000_000_000_000
 INTERVAL_NS = 10_000_000
 
-# Every worker of a parallel run has DDS traffic of its own, on this machine only.
+# Every worker of a parallel run has DDS traffic of its own, on this machine only; a run beside another one begins at
+# another domain.
 _WORKER = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", "0"))) or 0)
-os.environ["ROS_DOMAIN_ID"] = str(40 + _WORKER % 60)
+os.environ["ROS_DOMAIN_ID"] = str(int(os.environ.get("SDIMU_FIRST_DOMAIN", "40")) + _WORKER % 30)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 

@@ -2,7 +2,7 @@
 
 A file's tests stay on one worker, which makes its fixtures once. `pytest-xdist` hands out the files with most tests
 first, so a file of few long ones comes last, and one worker ends minutes after the other. Here the longest come first,
-and a file whose tests share no fixture is handed out test by test.
+a file whose tests share no fixture is handed out test by test, and files that share a long one stay together.
 """
 
 from __future__ import annotations
@@ -21,42 +21,63 @@ APART = (
 )
 """Files of long tests that share nothing: their tests may go to any worker."""
 
+TOGETHER = {
+    "test/ros/test_layouts.py": "test/ros/test_whole_run.py",
+    "test/ros/test_transforms.py": "test/ros/test_whole_run.py",
+}
+"""Files that go to the worker of another one, with which they share a whole run over DDS."""
+
 LONGEST = (
     "test/book/test_blocks.py",
+    "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
+    "test/sdimu_calibration/core/joint/test_set_search.py",
+    "test/sdimu_calibration/report/workbench/test_workbench.py",
     "test/sdimu_calibration/cli/test_terminal.py",
+    "test/sdimu_calibration/core/diagnosis/test_effects_in_noise.py",
+    "test/sdimu_calibration/core/batch/test_batch.py",
+    "test/sdimu_calibration/core/estimation/test_every_estimator.py",
+    "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py",
     "test/recovery/test_faults.py",
     "test/recovery/test_grades.py",
     "test/mutation/test_mutations.py",
-    "test/sdimu_calibration/core/joint/test_static_sets.py",
-    "test/ros/test_live_diagnosis.py",
-    "test/ros/test_layouts.py",
     "test/ros/test_ros_machine.py",
-    "test/ros/test_table_goals.py",
     "test/ros/test_robustness.py",
-    "test/ros/test_checkpoint.py",
-    "test/ros/test_compensate.py",
+    "test/ros/test_table_goals.py",
+    "test/ros/test_watch_a_run.py",
     "test/ros/test_whole_run.py",
-    "test/browser/test_workbench_in_a_browser.py",
-    "test/sdimu_calibration/report/workbench/test_workbench.py",
-    "test/sdimu_calibration/core/estimation/test_every_estimator.py",
-    "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
-    "test/sdimu_calibration/core/joint/test_set_search.py",
-    "test/sdimu_calibration/core/joint/test_set_fit.py",
-    "test/sdimu_calibration/core/batch/test_batch.py",
-    "test/recovery/test_recovery.py",
+    "test/ros/test_layouts.py",
+    "test/ros/test_foreign_messages.py",
+    "test/ros/test_live_page.py",
+    "test/ros/test_adaptive.py",
+    "test/ros/test_add_live.py",
+    "test/ros/test_stay.py",
+    "test/ros/test_live_diagnosis.py",
+    "test/ros/test_launch_files.py",
+    "test/ros/test_checkpoint.py",
+    "test/sdimu_calibration/core/joint/test_static_sets.py",
+    "test/sdimu_calibration/core/joint/test_changed.py",
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py",
+    "test/sdimu_calibration/core/evidence/test_learned_noise.py",
+    "test/sdimu_study/test_hand_run.py",
+    "test/sdimu_calibration/core/joint/test_set_fit.py",
     "test/sdimu_calibration/cli/test_exit_status.py",
+    "test/sdimu_calibration/core/diagnosis/test_pairs.py",
+    "test/sdimu_calibration/api/test_recording_set.py",
+    "test/sdimu_calibration/api/test_api.py",
+    "test/sdimu_calibration/core/diagnosis/test_families.py",
+    "test/recovery/test_recovery.py",
+    "test/sdimu_calibration/core/diagnosis/test_strong_effects.py",
     "test/sdimu_calibration/core/second_order/test_second_order.py",
     "test/sdimu_calibration/core/noise/test_quantisation.py",
     "test/sdimu_calibration/cli/test_diagnose.py",
     "test/sdimu_calibration/core/posterior/test_combinations.py",
     "test/sdimu_calibration/core/diagnosis/test_coefficient_shifts.py",
 )
-"""Files that keep a processor busy for 20 s and more, about in that order; the rest follow by their number of tests."""
+"""Files that keep a processor busy for 15 s and more, about in that order; the rest follow by their number of tests."""
 
 
 def scope_of(name: str) -> str:
-    """Name what stays on one worker with a test: its file, or the test alone.
+    """Name what stays on one worker with a test: its file, that of its fixture, or the test alone.
 
     Parameters
     ----------
@@ -64,7 +85,7 @@ def scope_of(name: str) -> str:
         Of the test, as pytest prints it.
     """
     file = name.partition("::")[0]
-    return name if file in APART else file
+    return name if file in APART else TOGETHER.get(file, file)
 
 
 def longest_first(items: Sequence[pytest.Item]) -> list[pytest.Item]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from mutants import CORE, MUTANTS
-from sharing import APART, LONGEST, scope_of
+from sharing import APART, LONGEST, TOGETHER, scope_of
 from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -50,17 +50,22 @@ def test_what_make_test_leaves_out_is_run_by_ci_and_decides_there():
     assert '-m "not thorough and not slow and not bench"' in make
     assert '-m "thorough and ros and not slow and not bench"' in make
     assert '-m "thorough and not ros and not slow and not bench"' in make
-    for line in ("make test", "make -j 2 colcon docs", "make thorough", "make other-blas"):
+    for line in ("make test", "make -j 3 colcon docs other-blas", "make thorough"):
         # Alone on its line: nothing takes its failure away.
         assert f"\n{line}\n" in ci
 
 
-def test_what_thorough_leaves_to_one_kernel_of_linear_algebra_it_runs_with_the_other():
+def test_what_runs_with_one_kernel_of_linear_algebra_elsewhere_runs_with_another_in_other_blas():
     make = (ROOT / "Makefile").read_text()
     assert "\nthorough: export OPENBLAS_CORETYPE = Haswell\n" in make
-    haswell, nehalem = make.split("\nother-blas: setup\n")[1].split("OPENBLAS_CORETYPE=")[1:3]
-    assert '-m "not thorough and not slow and not bench"' in haswell
-    assert '-m "not slow and not bench"' in nehalem
+    assert "\ntest: export OPENBLAS_CORETYPE = Haswell\n" in make
+    assert "\nother-blas: export OPENBLAS_CORETYPE = Nehalem\n" in make
+    assert '-m "not slow and not bench"' in make.split("\nother-blas: setup\n")[1].partition("\n\n")[0]
+
+
+def test_thorough_makes_both_of_its_parts():
+    make = (ROOT / "Makefile").read_text().split("\nthorough: setup\n")[1].partition("\n\n")[0]
+    assert make.endswith(" thorough-nodes thorough-rest")
 
 
 def test_every_mutant_is_one_place_of_the_core():
@@ -70,13 +75,14 @@ def test_every_mutant_is_one_place_of_the_core():
 
 
 def test_every_file_that_is_shared_out_first_or_test_by_test_is_there():
-    assert not [name for name in (*APART, *LONGEST) if not (ROOT / name).is_file()]
+    assert not [name for name in (*APART, *LONGEST, *TOGETHER, *TOGETHER.values()) if not (ROOT / name).is_file()]
     assert len(set(LONGEST)) == len(LONGEST)
 
 
 def test_a_file_stays_on_one_worker_unless_its_tests_are_shared_out_one_by_one():
     assert scope_of("test/a/test_b.py::test_c[d::e]") == "test/a/test_b.py"
     assert scope_of(f"{APART[0]}::test_c[d]") == f"{APART[0]}::test_c[d]"
+    assert scope_of("test/ros/test_layouts.py::test_c[d]") == scope_of("test/ros/test_whole_run.py::test_e")
     for name in APART:
         text = (ROOT / name).read_text()
         assert "scope=" not in text, name

@@ -17,7 +17,8 @@ from sdimu_calibration.cli.processes import Children, own_domain
 from sdimu_calibration.storage.bags.bag_file import raw_messages
 from sdimu_calibration.storage.bags.cdr import IMU, decode_imu
 
-RATE_HZ = 100
+RATE_HZ = 50
+"""Half of what a run takes unless told: every message is work for each of four nodes."""
 DWELL_S = 40.0
 TURN_S = 3.0
 RECORDER = "sdimu_calibration.nodes.recorder_node"
@@ -83,6 +84,19 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FitSessio
         yield FitSession(tmp_path, children)
 
 
+@pytest.fixture
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A domain for one run, which is found as the only one of this machine.
+
+    Its own locks are in a folder of this test, so that no other run is found. The domain is held where the others look,
+    too: two runs that took the same one would mix their samples.
+    """
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    with own_domain(tmp_path / "log") as domain:
+        monkeypatch.setenv("TMPDIR", str(tmp_path))
+        yield domain
+
+
 def imu_stamps(bag: Path) -> np.ndarray:
     """Stamps (ns) of the IMU samples in a bag, as recorded."""
     return decode_imu(raw_messages(bag, {"/imu/data_raw": IMU}, "/imu/data_raw")["/imu/data_raw"])[0]
@@ -103,11 +117,11 @@ class Run:
     output: str
 
 
-def runs(root: Path, number: int) -> list[Run]:
+def runs(root: Path, number: int, dwell_s: float = DWELL_S) -> list[Run]:
     """Run the same test several times at once."""
-    plan = write_plan(root / "plan.yaml", DWELL_S)
+    plan = write_plan(root / "plan.yaml", dwell_s)
     folders = [root / f"run{k}" for k in range(number)]
-    processes = [sdimu("run", "--plan", plan, "--seed", 5, "--out", folder) for folder in folders]
+    processes = [sdimu("run", "--plan", plan, "--rate", RATE_HZ, "--seed", 5, "--out", folder) for folder in folders]
     done = []
     for folder, process in zip(folders, processes, strict=True):
         try:

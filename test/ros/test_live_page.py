@@ -66,8 +66,7 @@ class Page:
         return answer
 
 
-def test_a_page_follows_a_run_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
+def test_a_page_follows_a_run_to_its_end(tmp_path: Path, apart: int) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
@@ -84,6 +83,8 @@ def test_a_page_follows_a_run_to_its_end(tmp_path: Path, monkeypatch: pytest.Mon
         "--no-browser",
         "--port",
         port,
+        "--domain",
+        apart,
         "--out",
         out,
     )

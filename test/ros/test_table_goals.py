@@ -28,7 +28,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, header, to_ns
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import FitSession, imu_stamps, write_plan
+from .conftest import RATE_HZ, FitSession, imu_stamps, write_plan
 
 pytestmark = pytest.mark.ros
 
@@ -193,7 +193,7 @@ def test_a_plan_by_goals_calibrates_as_the_plan_and_again_the_same(bench: FitSes
     write_plan(bench.plan, 12.0)
     bench.start("recorder")
     bench.start("calibration")
-    bench.start("sdimu")
+    bench.start("sdimu", rate_hz=100.0)
     bench.start("rate_table", follow_goals=True)
     driving = {"plan": str(bench.plan), "table": "ideal", "finish": True}
     bench.children.start("table_goals", GOALS, driving | {"allow_motion": True})
@@ -273,7 +273,7 @@ def test_a_node_killed_in_a_turn_leaves_no_result_and_says_so(bench: FitSession,
         assert person.phases[-1][1:] == ("dwell", "1")
         bench.children.start("table_goals", GOALS, driving)
         bench.wait_for_end()
-        assert read_result(bench.folder).data["samples"] > 4000
+        assert read_result(bench.folder).data["samples"] > 40 * RATE_HZ
         return
     time.sleep(4.0)
     assert not (bench.folder / "result.json").exists()

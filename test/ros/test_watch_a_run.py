@@ -35,11 +35,14 @@ def both_ended(run: Popen[str], watch: Popen[str], folder: Path) -> tuple[str, s
     return done, seen
 
 
-def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Locks of this test alone: other runs on this machine are not meant.
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    plan = write_plan(tmp_path / "plan.yaml", 40.0)
-    run = sdimu("run", "--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--out", tmp_path / "run")
+def start_run(tmp_path: Path, domain: int, dwell_s: float) -> Popen[str]:
+    plan = write_plan(tmp_path / "plan.yaml", dwell_s)
+    given = ("--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--domain", domain)
+    return sdimu("run", *given, "--out", tmp_path / "run")
+
+
+def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, apart: int) -> None:
+    run = start_run(tmp_path, apart, 40.0)
     watch = None
     try:
         begun = time.monotonic()
@@ -58,17 +61,13 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, mo
     assert read_result(tmp_path / "run").names[-1] == EFFECT
 
 
-def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
+def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, apart: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     run, watch = None, sdimu("watch")
     try:
         assert watch.stdout is not None
         assert watch.stdout.readline().startswith("no sdimu run on this machine yet: waiting for one")
-        plan = write_plan(tmp_path / "plan.yaml", 20.0)
-        run = sdimu("run", "--plan", plan, "--rate", 20, "--speed", 3, "--no-diagnose", "--out", tmp_path / "run")
+        run = start_run(tmp_path, apart, 20.0)
         both_ended(run, watch, tmp_path / "run")
     finally:
         for process in (run, watch):

@@ -76,7 +76,7 @@ def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site, 
 def test_errors_of_the_batch_are_as_large_as_it_says(imu, model, site):
     total, dof = 0.0, 0
     for seed in range(1, 9):
-        recording, truth = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=50.0))
+        recording, truth = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=20.0))
         value, n = nees(calibrate(recording, site, imu, model, estimator="batch"), truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
@@ -94,8 +94,8 @@ def test_misfit_of_the_batch_is_that_of_the_noise(imu, model, site):
 
 def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
     total, dof = 0.0, 0
-    for seed in range(1, 7):
-        recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=seed, rate_hz=50.0))
+    for seed in range(1, 5):
+        recording, truth = generate(Scenario(KIM18, PERCENTS, site, seed=seed, rate_hz=20.0))
         found = calibrate(recording, site, PERCENTS, model, estimator="batch")
         value, n = nees(found, truth)
         total, dof = total + value, dof + n
@@ -117,7 +117,7 @@ def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, sit
 def test_coefficients_are_honest_near_and_at_the_poles(imu, model, site, latitude_deg):
     there = replace(site, latitude_rad=np.radians(latitude_deg), height_m=5000.0)
     total, dof = 0.0, 0
-    for seed in range(1, 5):
+    for seed in (1, 2):
         recording, truth = generate(Scenario(KIM18, imu, there, seed=seed, rate_hz=20.0))
         value, n = nees(calibrate(recording, there, imu, model, estimator="batch"), truth)
         total, dof = total + value, dof + n

@@ -56,9 +56,9 @@ CASES = (
 TABLE_IMUS = ("dtg", "rlg_navigation", "fog_tactical", "mems_industrial", "mems_consumer")
 
 
-def scenario(imu):
+def scenario(imu, dwell_s=40.0):
     plan = load_plan("kim18_signed")
-    return Scenario(replace(plan, dwell_s=(40.0,) * len(plan.dwell_s)), load_imu(imu), SITE, rate_hz=20.0, seed=71)
+    return Scenario(replace(plan, dwell_s=(dwell_s,) * len(plan.dwell_s)), load_imu(imu), SITE, rate_hz=20.0, seed=71)
 
 
 @cache
@@ -165,8 +165,8 @@ def test_free_navigation_is_made_or_refused_with_its_reason(case):
 @pytest.mark.parametrize("imu", TABLE_IMUS)
 def test_every_caller_gives_the_same_digits(imu, tmp_path):
     """Calibrate, the base fit of a diagnosis, the workbench, the end of a live test; and a campaign without a bag."""
-    model = load_model("baseline")
-    write_test(tmp_path / "bag", scenario(imu), simulate_test(scenario(imu)))
+    model, short = load_model("baseline"), scenario(imu, 20.0)
+    write_test(tmp_path / "bag", short, simulate_test(short))
     options = OpeningOptions(load_imu(imu), SITE)
     test = PreparedTest(*open_read(read_recording(tmp_path / "bag"), options))
     recording = test.recording
@@ -182,7 +182,7 @@ def test_every_caller_gives_the_same_digits(imu, tmp_path):
     for other in (base, bench, live.finish()):
         np.testing.assert_array_equal(other.values, once.values)
         np.testing.assert_array_equal(other.covariance, once.covariance)
-    row, simulated = STUDY.of(Campaign(scenario(imu), model))(71), calibrate(recording_of(imu), SITE, test.imu, model)
+    row, simulated = STUDY.of(Campaign(short, model))(71), calibrate(generate(short)[0], SITE, test.imu, model)
     np.testing.assert_array_equal(row["estimate"], simulated.values)
 
 
