@@ -44,7 +44,7 @@ def z_of(fit: SetFit, unit) -> np.ndarray:
 
 
 def test_coefficients_are_as_good_as_their_sigmas_say(unit, as_given):
-    z = z_of(with_function(as_given, ("accel_x",), here), unit)
+    z = z_of(with_function(as_given, ("accel_x",), here).fit, unit)
     assert np.sqrt(np.mean(z**2)) < 1.3
     assert np.abs(z).max() < 4.0
     # Without the function coefficients are off by many sigmas: what is tested is there.
@@ -53,7 +53,7 @@ def test_coefficients_are_as_good_as_their_sigmas_say(unit, as_given):
 
 def test_it_changes_next_to_nothing_where_nothing_is_left(options):
     clean = fit_set(unit_set(SEED, [FORTH, backwards(FORTH)]).members, options, here)
-    beside = with_function(clean, ("accel_x",), here)
+    beside = with_function(clean, ("accel_x",), here).fit
     sigma = np.sqrt(np.diag(clean.estimate.covariance))
     np.testing.assert_array_less(np.abs(beside.estimate.values - clean.estimate.values), sigma)
     # It may be as large as the noise hides: in the coefficients of that accelerometer alone.

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
-from sdimu_calibration.core.joint.set_search import as_given, search_set
+from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -56,7 +56,7 @@ def test_taking_back_effects_keeps_the_fault_of_one_recording(options):
     bad = unit_set(33, [short()] * 3, ("gyro_bias_step_x(t0=400 s)=0.3 deg/h",))
     members = (*unit_set(33, [short()] * 3).members[:2], bad.members[2])
     found = search_set(members, options, here)
-    back = as_given(found, options, here)
+    back = taken_back(found, options, here, [c.label for c in found.chosen])
     assert found.local
     assert (back.chosen, back.local, back.after.local) == ((), found.local, found.after.local)
     assert back.standing.added == ()

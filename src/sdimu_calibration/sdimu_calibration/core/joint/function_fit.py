@@ -6,8 +6,8 @@ function are parameters of all recordings, and are integrated out of the coeffic
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,27 @@ _LEARNINGS = 2
 """Number of times that each recording learns its noise beside the function: a third changes no size by a tenth."""
 
 
-def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> SetFit:
-    """Return the fit with its estimate beside an unknown function of the attitude; as it is in a run by hand.
+@dataclass(frozen=True)
+class Beside:
+    """A joint fit beside a function.
+
+    Attributes
+    ----------
+    fit : SetFit
+        With the estimate beside the function.
+    reports : tuple of Report
+        Rows with the weights.
+    shared : SharedFunction or None
+        None where there is none: then the estimate is that without.
+    """
+
+    fit: SetFit
+    reports: tuple[Report, ...] = ()
+    shared: SharedFunction | None = None
+
+
+def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
+    """Estimate the coefficients of a fit beside an unknown function of the attitude; of a run by hand as they are.
 
     Parameters
     ----------
@@ -41,7 +60,7 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> SetFit:
         Does the jobs.
     """
     if any(r.estimator == HandheldFit.estimator for r in fit.reports):
-        return fit
+        return Beside(fit)
     places = [r.places for r in with_places(fit, run) if r.places is not None]
     functions = covering(np.vstack([p.up for p in places]), np.vstack([p.way for p in places]), _MOST)
     shared = SharedFunction(functions, tuple(c for c in CHANNELS if c in sensors), {})
@@ -50,7 +69,51 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> SetFit:
         shared = replace(shared, size=_sizes(fit, reports, shared))
         reports = _asked(fit, shared, run)
     shared = replace(shared, size=_sizes(fit, reports, shared))
-    return replace(fit, estimate=_estimated(fit, reports, shared))
+    return Beside(replace(fit, estimate=_estimated(fit, reports, shared)), tuple(reports), shared)
+
+
+def needless(beside: Beside, effects: Mapping[str, str], log_prior: Callable[[Sequence[str]], float]) -> list[str]:
+    """Find the effects that the function explains: without them the posterior is larger, one after the other.
+
+    Parameters
+    ----------
+    effects : mapping of str to str
+        Names of coefficients of the fit by label.
+    log_prior : callable
+        Of labels to the log of their prior over that of none (1).
+
+    Returns
+    -------
+    list of str
+        Labels.
+    """
+    if beside.shared is None:
+        return []
+    kept = list(effects)
+
+    def score(labels: Sequence[str]) -> float:
+        lacks = [name for label, name in effects.items() if label not in labels]
+        return _without(beside, lacks) + log_prior(labels)
+
+    best = score(kept)
+    while kept:
+        trials = [[label for label in kept if label != one] for one in kept]
+        scores = [score(trial) for trial in trials]
+        if max(scores) < best:
+            break
+        best, kept = max(scores), trials[int(np.argmax(scores))]
+    return [label for label in effects if label not in kept]
+
+
+def _without(beside: Beside, names: Sequence[str]) -> float:
+    """Log-likelihood of a fit without some coefficients, with the function as large as is likeliest then (1)."""
+    fit, shared = beside.fit, beside.shared
+    if shared is None:
+        raise AssertionError("a function is needed")
+    at = [k for k, name in enumerate(fit.names) if name not in names]
+    less = replace(fit, names=tuple(fit.names[k] for k in at), weight=fit.weight[at])
+    sized = replace(shared, size=_sizes(less, beside.reports, shared))
+    return _likelihood(less, beside.reports, sized)
 
 
 def _asked(fit: SetFit, shared: SharedFunction, run: Run) -> list[Report]:
@@ -100,8 +163,10 @@ def _combined(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) ->
 
 
 def _likelihood(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> float:
-    """Log-likelihood of the sizes, the weights integrated out (1)."""
-    return _combined(fit, reports, shared).log_likelihood(fit.tau) + 0.5 * float(np.log(shared.known).sum())
+    """Log-likelihood of the sizes, coefficients and weights integrated over their priors (1)."""
+    combined, known = _combined(fit, reports, shared), np.concatenate([fit.weight, shared.known])
+    # Its own is that of parameters in units that hang on what is known of them.
+    return combined.log_likelihood(fit.tau) + float(np.log(combined.unit).sum() + 0.5 * np.log(known).sum())
 
 
 def _estimated(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> JointEstimate:

@@ -15,7 +15,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
-from sdimu_calibration.core.joint.function_fit import with_function
+from sdimu_calibration.core.joint.function_fit import needless, with_function
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
@@ -24,7 +24,7 @@ from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance, own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
-from sdimu_calibration.core.joint.set_search import SetSearch, as_given, place_of, search_set
+from sdimu_calibration.core.joint.set_search import SetSearch, place_of, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
@@ -135,22 +135,24 @@ def diagnose_set(
     again = recurrence(leftovers(found.after, run))
     word = _verdict(findings, after, found.after, again)
     refused: tuple[SetFinding, ...] = ()
-    taken_back = ""
+    why = ""
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
         refused = tuple(f for f in findings if not f.recording)
-        taken_back = _taken_back(refused, before, after)
-        found = as_given(found, options, run)
+        why = _fits_worse(refused, before, after)
+        found = taken_back(found, options, run, [f.label for f in refused])
         after, findings = (set_outcome(found.after), _findings(found)) if found.local else (before, ())
         again = recurrence(leftovers(found.after, run))
         word = _verdict(findings, after, found.after, again)
     if word == Verdict.UNEXPLAINED and again is not None and ATTITUDE in again.answer:
-        found = replace(found, after=with_function(found.after, again.sensors, run))
+        found, needed_not = _beside_function(found, again, options, run)
+        refused += tuple(f for f in findings if f.label in needed_not)
+        why = f"{why} {_explained(needed_not)}".strip()
         after, findings = set_outcome(found.after), _findings(found)
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
-    sentence = f"{_sentence(word, findings, (without, after), again)} {taken_back}".strip()
+    sentence = f"{_sentence(word, findings, (without, after), again)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -166,6 +168,27 @@ def diagnose_set(
         without,
         probabilities(found.posterior),
     )
+
+
+def _beside_function(found: SetSearch, again: Recurrence, options: SetOptions, run: Run) -> tuple[SetSearch, list[str]]:
+    """Estimate what was found beside a function of the attitude, without the effects that it explains; their labels.
+
+    An effect that imitates an unknown function was found as nothing else was there to take it up.
+    """
+    beside = with_function(found.after, again.sensors, run)
+    board = found.posterior.board
+    number = {found.posterior.candidate(k).label: k for k in range(len(board.use))}
+    names = {c.label: found.after.names[place_of(found.after.names, c)] for c in found.chosen if c.label in number}
+    labels = needless(beside, names, lambda kept: board.prior.log_of([number[label] for label in kept]))
+    if labels:
+        found = taken_back(found, options, run, labels)
+        beside = with_function(found.after, again.sensors, run)
+    return replace(found, after=beside.fit), labels
+
+
+def _explained(labels: Sequence[str]) -> str:
+    """Say what a function of the attitude explains as well."""
+    return f"An unknown function of the attitude explains {', '.join(labels)}, too: not told." if labels else ""
 
 
 def _error_without(found: SetSearch) -> float | None:
@@ -295,7 +318,7 @@ def _named(f: SetFinding) -> str:
     return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
 
 
-def _taken_back(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
+def _fits_worse(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
     names = ", ".join(f.label for f in findings[:_LISTED]) + (", ..." if len(findings) > _LISTED else "")
     return (
         f"The model stays as given: with {names} the error at recordings held out, each model in the noise that it "

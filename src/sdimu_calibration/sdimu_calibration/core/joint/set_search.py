@@ -240,8 +240,8 @@ def _first_ones(fit: SetFit, found: Search[SetEvidence], told: Sequence[Candidat
     return tuple(chosen)
 
 
-def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
-    """Return the search as if it had chosen no effect of all recordings: the model as given stands.
+def taken_back(found: SetSearch, options: SetOptions, run: Run, labels: Sequence[str]) -> SetSearch:
+    """Return the search as if it had not chosen some effects of all recordings.
 
     Parameters
     ----------
@@ -249,15 +249,20 @@ def as_given(found: SetSearch, options: SetOptions, run: Run) -> SetSearch:
         What it found in one recording alone stays.
     run : callable
         Does the jobs.
+    labels : sequence of str
+        Of the effects.
     """
+    kept = [c for c in found.chosen if c.label not in labels]
+    own = [replace(_of_one(tagged(one.key, one.recording)), recording=one.recording) for one in found.local]
     fit = found.before
-    if found.local:
-        local = dict(options.local)
-        for find in found.local:
-            local[find.recording] = (*local.get(find.recording, ()), find.key)
-        fit = fit_set(fit.members, replace(options, local=local), run, fit)
-    standing = set_standing(fit, set_evidence(fit, ()), {}, {})
-    return replace(found, after=fit, chosen=(), z=(), alike={}, probability={}, standing=standing)
+    if kept or own:
+        fit = fit_set(fit.members, _with(options, [*kept, *own]), run, fit)
+    shared = {c.label: c for c in kept}
+    alike = {label: found.alike[label] for label in shared}
+    standing = found.standing if kept else set_standing(fit, set_evidence(fit, ()), {}, {})
+    z = tuple(z for c, z in zip(found.chosen, found.z, strict=True) if c.label in shared)
+    probability = {label: found.probability[label] for label in shared}
+    return replace(found, after=fit, chosen=tuple(kept), z=z, alike=alike, probability=probability, standing=standing)
 
 
 def _singles(evidence: SetEvidence) -> Ints:
