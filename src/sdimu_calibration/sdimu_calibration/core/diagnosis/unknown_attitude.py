@@ -5,19 +5,24 @@ Its mean over a stretch is worked out in every search; exact are functions of th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import given_terms, sizes_on_grid
+from sdimu_calibration.core.evidence.learned_noise import Wander, given_terms, sizes_on_grid
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
 
 _GAIN = 4.0
 """Log-likelihood (1) from which functions of the attitude are looked at: their odds make up for as much."""
+_HINT = 1.0
+"""Log-likelihood (1) that the mean over stretches must gain before functions are worked out: half a second that
+recordings with plain noise need not take."""
 
 
 def with_attitude_functions(request: Request, found: Search[LinearEvidence]) -> Request:
@@ -31,17 +36,30 @@ def with_attitude_functions(request: Request, found: Search[LinearEvidence]) -> 
     window, evidence = found.posterior, found.evidence if found.white is None else found.white
     if request.wander is None or window is None:
         return request
-    wander = request.wander.with_functions(evidence)
-    told = window.board.columns(window.told.members)
-    known = evidence.only(np.array(told, dtype=np.int64))
-    weight = window.board.parameters(window.told.members)[1]
-    information = Joint.of(known, wander).on_wander(np.arange(len(weight)), weight)
+    board, told = window.board, window.told
+    known = evidence.only(np.array(board.columns(told.members), dtype=np.int64))
+    weight = board.parameters(told.members)[1]
     # Its mean in each stretch would take it up.
-    beside = [term for term in window.told.noise.terms if term.kind != ATTITUDE]
-    for triad in TRIADS:
-        _, gain = sizes_on_grid(
-            *given_terms(information, wander.cut, beside, triad), wander.cut, NoiseTerm(triad, ATTITUDE)
-        )
-        if gain.max(initial=0.0) > _GAIN:
-            return replace(request, wander=wander)
-    return request
+    beside = [term for term in told.noise.terms if term.kind != ATTITUDE]
+    if _gain(request.wander, known, weight, beside) < _HINT:
+        return request
+    wander = request.wander.with_functions(evidence)
+    return replace(request, wander=wander) if _gain(wander, known, weight, beside) > _GAIN else request
+
+
+def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequence[NoiseTerm]) -> float:
+    """Log-likelihood that an error which follows the attitude adds in the triad that shows it best (1).
+
+    Parameters
+    ----------
+    known : LinearEvidence
+        Of what is estimated along alone, with its prior information `weight`, shape (p,).
+    beside : sequence of NoiseTerm
+        Noise of the model.
+    """
+    information = Joint.of(known, wander).on_wander(np.arange(len(weight)), weight)
+    gains = [
+        sizes_on_grid(*given_terms(information, wander.cut, beside, t), wander.cut, NoiseTerm(t, ATTITUDE))[1]
+        for t in TRIADS
+    ]
+    return float(np.max(np.concatenate(gains), initial=0.0))
