@@ -14,7 +14,7 @@ import numpy as np
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.attitude_functions import covering
-from sdimu_calibration.core.joint.combine import Combination, JointEstimate, Rows
+from sdimu_calibration.core.joint.combine import Combination, Rows
 from sdimu_calibration.core.joint.leftovers import with_places
 from sdimu_calibration.core.joint.member import Job, Report
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, columns_of, grouped_rows, with_own
@@ -24,7 +24,7 @@ from sdimu_calibration.core.recording import DataError
 
 _MOST = 150
 """Number of functions at most: several plans together cover more of the sphere than one."""
-_SIZES = np.geomspace(0.1, 1e4, 41)
+_SIZES = np.geomspace(1e-3, 1e4, 57)
 """Ratios of the sizes that are tried to the one at which a function is seen at all: neighbours differ by a third."""
 _LEARNINGS = 2
 """Number of times that each recording learns its noise beside the function: a third changes no size by a tenth."""
@@ -42,11 +42,14 @@ class Beside:
         Rows with the weights.
     shared : SharedFunction or None
         None where there is none: then the estimate is that without.
+    gain : float
+        Log-likelihood that the function adds (1).
     """
 
     fit: SetFit
     reports: tuple[Report, ...] = ()
     shared: SharedFunction | None = None
+    gain: float = 0.0
 
 
 def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
@@ -69,7 +72,8 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
         shared = replace(shared, size=_sizes(fit, reports, shared))
         reports = _asked(fit, shared, run)
     shared = replace(shared, size=_sizes(fit, reports, shared))
-    return Beside(replace(fit, estimate=_estimated(fit, reports, shared)), tuple(reports), shared)
+    gain = _likelihood(fit, reports, shared) - _likelihood(fit, reports, _tiny(fit, reports, shared))
+    return Beside(_estimated(fit, reports, shared), tuple(reports), shared, gain)
 
 
 def needless(beside: Beside, effects: Mapping[str, str], log_prior: Callable[[Sequence[str]], float]) -> list[str]:
@@ -142,14 +146,24 @@ def _asked(fit: SetFit, shared: SharedFunction, run: Run) -> list[Report]:
 
 def _sizes(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:
     """Likeliest size of each sensor (SI), one after the other; what is not seen gets one that changes little."""
-    p = len(fit.names)
-    seen = np.sum([np.sum(rows.A[:, p:] ** 2, axis=0) for rows in _rows(fit, reports, shared)], axis=0)
-    least = {sensor: float(np.median(seen[shared.of(sensor)])) ** -0.5 for sensor in shared.sensors}
+    least = _seen(fit, reports, shared)
     found = replace(shared, size=least | dict(shared.size))
     for sensor in shared.sensors:
         tried = [replace(found, size={**found.size, sensor: least[sensor] * ratio}) for ratio in _SIZES]
         found = max(tried, key=lambda one: _likelihood(fit, reports, one))
     return dict(found.size)
+
+
+def _seen(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:
+    """Size at which the function of a sensor is seen at all (SI)."""
+    p = len(fit.names)
+    seen = np.sum([np.sum(rows.A[:, p:] ** 2, axis=0) for rows in _rows(fit, reports, shared)], axis=0)
+    return {sensor: float(np.median(seen[shared.of(sensor)])) ** -0.5 for sensor in shared.sensors}
+
+
+def _tiny(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> SharedFunction:
+    """Make the function so small that it is as good as none."""
+    return replace(shared, size={k: float(_SIZES[0]) * size for k, size in _seen(fit, reports, shared).items()})
 
 
 def _rows(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> list[Rows]:
@@ -169,9 +183,10 @@ def _likelihood(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) 
     return combined.log_likelihood(fit.tau) + float(np.log(combined.unit).sum() + 0.5 * np.log(known).sum())
 
 
-def _estimated(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> JointEstimate:
+def _estimated(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> SetFit:
+    """Return the fit with estimate and scatter of the power-ons beside a function."""
     combined, p = _combined(fit, reports, shared), len(fit.names)
-    estimate = (
-        in_scatter(combined, turn_on_scatter(combined)) if combined.components else combined.estimate(np.empty(0))
-    )
-    return replace(estimate, values=estimate.values[:p], covariance=estimate.covariance[:p, :p])
+    turn_on = turn_on_scatter(combined) if combined.components else ()
+    found = in_scatter(combined, turn_on)
+    estimate = replace(found, values=found.values[:p], covariance=found.covariance[:p, :p])
+    return replace(fit, estimate=estimate, turn_on=turn_on, function=shared)

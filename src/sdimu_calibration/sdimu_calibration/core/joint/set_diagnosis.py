@@ -15,7 +15,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
-from sdimu_calibration.core.joint.function_fit import needless, with_function
+from sdimu_calibration.core.joint.function_fit import Beside, needless, with_function
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
@@ -25,7 +25,7 @@ from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, hel
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, search_set, taken_back
-from sdimu_calibration.core.joint.set_standing import next_recording
+from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
@@ -38,6 +38,9 @@ from sdimu_calibration.core.wording import Work
 _STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
 reach it: 1 is right."""
+_SHARED = 10.0
+"""Log-likelihood (1) that a function of the attitude must add to what is left: its odds and those of its size are far
+better."""
 _LISTED = 4
 """Number of effects that a sentence names: the table has the rest."""
 
@@ -144,15 +147,17 @@ def diagnose_set(
         after, findings = (set_outcome(found.after), _findings(found)) if found.local else (before, ())
         again = recurrence(leftovers(found.after, run))
         word = _verdict(findings, after, found.after, again)
-    if word == Verdict.UNEXPLAINED and again is not None and ATTITUDE in again.answer:
-        found, needed_not = _beside_function(found, again, options, run)
-        refused += tuple(f for f in findings if f.label in needed_not)
-        why = f"{why} {_explained(needed_not)}".strip()
-        after, findings = set_outcome(found.after), _findings(found)
+    asked = again is not None and (not again.answer or ATTITUDE in again.answer)
+    beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
+    if again is not None and beside.gain > _SHARED:
+        found, needed_not = _beside_function(found, beside, again, options, run)
+        refused += tuple(f for f in findings if f.label in needed_not and not f.recording)
+        why = f"{why} {_explained(again.sensors, needed_not)}".strip()
+        after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
-    sentence = f"{_sentence(word, findings, (without, after), again)} {why}".strip()
+    sentence = f"{_sentence(word, findings, (without, after), again, found.after.function is not None)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -170,25 +175,30 @@ def diagnose_set(
     )
 
 
-def _beside_function(found: SetSearch, again: Recurrence, options: SetOptions, run: Run) -> tuple[SetSearch, list[str]]:
+def _beside_function(
+    found: SetSearch, beside: Beside, again: Recurrence, options: SetOptions, run: Run
+) -> tuple[SetSearch, list[str]]:
     """Estimate what was found beside a function of the attitude, without the effects that it explains; their labels.
 
     An effect that imitates an unknown function was found as nothing else was there to take it up.
     """
-    beside = with_function(found.after, again.sensors, run)
-    board = found.posterior.board
+    board, fit = found.posterior.board, found.after
     number = {found.posterior.candidate(k).label: k for k in range(len(board.use))}
-    names = {c.label: found.after.names[place_of(found.after.names, c)] for c in found.chosen if c.label in number}
+    names = {c.label: fit.names[place_of(fit.names, c)] for c in found.chosen if c.label in number}
+    names = {label: name for label, name in names.items() if name not in fit.varying_names}
     labels = needless(beside, names, lambda kept: board.prior.log_of([number[label] for label in kept]))
     if labels:
         found = taken_back(found, options, run, labels)
         beside = with_function(found.after, again.sensors, run)
-    return replace(found, after=beside.fit), labels
+    return replace(found, after=beside.fit, standing=standing_beside(beside.fit, found.chosen)), labels
 
 
-def _explained(labels: Sequence[str]) -> str:
-    """Say what a function of the attitude explains as well."""
-    return f"An unknown function of the attitude explains {', '.join(labels)}, too: not told." if labels else ""
+def _explained(sensors: Sequence[str], labels: Sequence[str]) -> str:
+    """Say what an unknown function explains."""
+    too = f"; it explains {', '.join(labels)}, too, which are not told" if labels else ""
+    return (
+        f"An unknown function of the attitude in {' and '.join(sensors)} explains it, the same in all recordings{too}."
+    )
 
 
 def _error_without(found: SetSearch) -> float | None:
@@ -271,18 +281,29 @@ def _scatter(result: Calibration) -> float:
 
 
 def _sentence(
-    word: Verdict, findings: Sequence[SetFinding], errors: tuple[float | None, Calibration], again: Recurrence | None
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    errors: tuple[float | None, Calibration],
+    again: Recurrence | None,
+    function: bool,
 ) -> str:
     """Say what was found, then what comes back of that what the model leaves.
 
-    `errors` are the one without what was found, in the noise of the result with it, and that result.
+    `errors` are the one without what was found, in the noise of the result with it, and that result. Where a `function`
+    of the attitude explains what is left, stops that do not come back are too few, and say nothing.
     """
-    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again else ""
-    return f"{_found(word, findings, *errors, again)} {more}".strip()
+    tells = again is not None and (not function or len(again.answer) > 0)
+    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
+    return f"{_found(word, findings, *errors, again, function)} {more}".strip()
 
 
 def _found(
-    word: Verdict, findings: Sequence[SetFinding], without: float | None, after: Calibration, again: Recurrence | None
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    without: float | None,
+    after: Calibration,
+    again: Recurrence | None,
+    function: bool,
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
@@ -294,9 +315,9 @@ def _found(
         return f"All recordings agree but for {names}."
     if word == Verdict.UNEXPLAINED:
         most = f" Found, but not all: {names}." if names else ""
-        shared = again is not None and again.answer and not _odd(after)
+        shared = function or (again is not None and again.answer and not _odd(after))
         what = "The recordings share something" if shared else "Something differs between the recordings"
-        return f"{what} that no effect of the catalogue explains.{most}{_odd(after)}"
+        return f"{what} that no effect of the catalogue explains.{most}{'' if function else _odd(after)}"
     falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
     return f"{in_grades(list(map(_graded, findings)))} {falls[0].upper()}{falls[1:]}."
 

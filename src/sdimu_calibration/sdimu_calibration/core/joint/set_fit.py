@@ -26,6 +26,7 @@ from sdimu_calibration.core.joint.set_order import (
     check_one_site,
     in_order,
 )
+from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -71,6 +72,8 @@ class SetFit:
         Recordings that could not be used, and why.
     asked : tuple of str
         Names of the recordings in the order of the user.
+    function : SharedFunction or None
+        Unknown function of the attitude beside which the estimate stands.
     """
 
     members: tuple[Member, ...]
@@ -84,6 +87,7 @@ class SetFit:
     turn_on: tuple[TurnOn, ...]
     left_out: tuple[tuple[str, str], ...] = ()
     asked: tuple[str, ...] = ()
+    function: SharedFunction | None = None
 
     @cached_property
     def power_ons(self) -> tuple[str, ...]:

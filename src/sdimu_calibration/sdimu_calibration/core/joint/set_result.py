@@ -150,7 +150,21 @@ def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
     scatter = [_scatter(t) for t in with_units(fit, base)]
     files = sorted({r.imu.name for r in fit.reports})
     mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
-    return (*mixed, *of_one, *scatter, *_told(fit, [r.notes for r in fit.reports]))
+    return (*mixed, *of_one, *_beside(fit), *scatter, *_told(fit, [r.notes for r in fit.reports]))
+
+
+def _beside(fit: SetFit) -> list[str]:
+    """Say beside which unknown function the coefficients were estimated, and how large it is."""
+    if fit.function is None:
+        return []
+    sizes = [f"{s} of {_size(s, v)}" for s, v in fit.function.size.items()]
+    return [f"estimated beside an unknown function of the attitude in {' and '.join(sizes)} that all recordings share"]
+
+
+def _size(sensor: str, size: float) -> str:
+    """Size of an error of a sensor (SI) in the unit that people read."""
+    unit = "deg/h" if sensor.startswith("gyro") else "ug"
+    return f"{from_si(size, unit):.3g} {unit}"
 
 
 def _told(fit: SetFit, lines: Sequence[Sequence[str]]) -> list[str]:
