@@ -28,7 +28,7 @@ from sdimu_calibration.core.evidence.conditions import alike_attitudes
 _LEFT = 1e-3
 """Variance of the function (1) that the knots may leave anywhere: a thirtieth of its size."""
 MOST = 90
-"""Number of knots at most: so many cover the whole sphere."""
+"""Number of knots at most: kim18, kim18_signed and recommended take 84 to 88, the whole sphere 222."""
 _PLACES = 3000
 """Number of directions (1) among which knots are looked for: a turn of half a circle is cut into parts of 2 deg."""
 _BLOCK = 10

@@ -3,10 +3,10 @@
 The number of effects that a model lacks is unknown: their rate is exponentially distributed with mean `MEAN_NUMBER`,
 and each candidate has its share of it. Integrated over the rate,
 
-    log pi(S) = sum_j log u_j + log k! - (k + 1) log(1 + b) + log b,   k = |S|,  b = 1 / MEAN_NUMBER,  sum u_j = 1
+    log pi(S) = sum_j log u_j + log k! - (n + 1) log(1 + b) + log b,   n = |S|,  b = 1 / MEAN_NUMBER,  sum u_j = 1
 
 so that a sensor with k effects is likelier to have one more (k + 1 times the odds of the first one). Equations that no
-physics names do not count in k: a sensor that has some is not likelier to have others. Several at once are more often
+physics names count in n alone: a sensor that has some is not likelier to have others. Several at once are more often
 the parts of one function, which is tried by itself. Source: J. Scott, J. Berger, "Bayes and empirical-Bayes
 multiplicity adjustment", Annals of Statistics 38 (2010).
 """

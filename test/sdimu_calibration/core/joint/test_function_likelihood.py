@@ -1,0 +1,74 @@
+"""The likelihood of a shared function against that of all measurements written out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
+from sdimu_calibration.core.joint.function_fit import Beside, _combined, _likelihood, needless
+from sdimu_calibration.core.joint.reduction import Reduction
+from sdimu_calibration.core.joint.shared_function import SharedFunction
+
+NAMES = ("gyro_bias_x", "accel_scale_x", "accel_bias_x")
+WEIGHT = np.array([1e10, 1e8, 1e7])
+SHARED = SharedFunction(AttitudeFunctions(np.eye(3)[:2]), ("gyro_x", "accel_y"), {"gyro_x": 1e-6, "accel_y": 3e-4})
+
+
+def recording(name: str, rng: np.random.Generator, y_of=None) -> SimpleNamespace:
+    """Rows of a recording of one power-on: random signatures, and measurements that nothing or `y_of` them makes."""
+    unit = np.array([1e6, 1e4, 1e4] + [1e6 if "gyro" in label else 1e4 for label in SHARED.labels])
+    A = rng.standard_normal((12, len(unit))) * unit
+    y = rng.standard_normal(12) + (0.0 if y_of is None else y_of(A))
+    rows = Reduction(NAMES, SHARED.labels, A, y, np.zeros(3), WEIGHT, 12, 0.0)
+    return SimpleNamespace(name=name, power_on=name, reduction=rows)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What the likelihood asks of a fit in which nothing varies."""
+
+    names: tuple[str, ...] = NAMES
+    weight: np.ndarray = field(default_factory=lambda: WEIGHT)
+    varying: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    tau: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+
+def fit_of(varying, tau) -> Fit:
+    return Fit(varying=varying, tau=np.array(tau))
+
+
+@pytest.mark.parametrize("size", [{}, {"gyro_x": 5e-6, "accel_y": 1e-5}])
+@pytest.mark.parametrize(("varying", "tau"), [({}, []), ({"bias": ("gyro_bias_x", "accel_bias_x")}, [2e-6])])
+def test_it_is_that_of_the_measurements_themselves(size, varying, tau):
+    rng = np.random.default_rng(3)
+    reports = [recording(name, rng) for name in "abc"]
+    shared = replace(SHARED, size=size or SHARED.size)
+    A, y = (np.concatenate([getattr(r.reduction, part) for r in reports]) for part in ("A", "y"))
+    prior = np.diag(1.0 / np.concatenate([WEIGHT, shared.known]))
+    covariance = A @ prior @ A.T + np.eye(len(y))
+    moving = [NAMES.index(name) for own in varying.values() for name in own]
+    for k in range(3):
+        own = slice(12 * k, 12 * k + 12)
+        covariance[own, own] += sum(tau) ** 2 * A[own][:, moving] @ A[own][:, moving].T
+    expected = 0.5 * (y @ y - y @ np.linalg.solve(covariance, y) - np.linalg.slogdet(covariance)[1])
+    fit = fit_of(varying, tau)
+    assert _likelihood(fit, reports, shared) == pytest.approx(expected, abs=1e-8)
+    gain = prior @ A.T @ np.linalg.inv(covariance)
+    told = _combined(fit, reports, shared).estimate(fit.tau)
+    np.testing.assert_allclose(told.values, gain @ y, rtol=1e-8)
+    np.testing.assert_allclose(np.diag(told.covariance), np.diag(prior - gain @ A @ prior), rtol=1e-7)
+
+
+def test_an_effect_stays_where_the_data_need_it_and_goes_where_they_do_not():
+    rng = np.random.default_rng(4)
+    there = np.zeros(3 + len(SHARED.labels))
+    there[1] = 2e-3
+    reports = tuple(recording(name, rng, lambda A: A @ there) for name in "abc")
+
+    beside = Beside(Fit(), reports, SHARED)  # type: ignore[arg-type]
+    named = {"real": "accel_scale_x", "idle": "accel_bias_x"}
+    assert needless(beside, named, lambda labels: -5.0 * len(labels)) == ["idle"]
