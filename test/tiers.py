@@ -30,6 +30,7 @@ LONG = {
     ),
     "test/sdimu_calibration/core/joint/test_function_fit.py": (
         "test_it_changes_next_to_nothing_where_nothing_is_left",
+        "test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attitudes",
     ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_consumer-1]",

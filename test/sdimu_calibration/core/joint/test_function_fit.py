@@ -7,9 +7,12 @@ import pytest
 
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.joint.function_fit import with_function
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.plan import backwards
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_sim.core.truth import in_body_frame
 
 from .conftest import here, short, unit_set
@@ -32,7 +35,10 @@ def as_given(unit, options) -> SetFit:
 
 def z_of(fit: SetFit, unit) -> np.ndarray:
     """Errors over sigma of all coefficients but the biases, which differ from power-on to power-on."""
-    told = set_outcome(fit)
+    return z_of_result(set_outcome(fit), unit)
+
+
+def z_of_result(told: Calibration, unit) -> np.ndarray:
     truth = in_body_frame(unit.truth, told.body_frame)
     sigma = np.sqrt(np.diag(told.covariance))
     free = [
@@ -60,4 +66,29 @@ def test_it_changes_next_to_nothing_where_nothing_is_left(options):
     others = ~np.array([name.startswith("accel") and "x" in name.rpartition("_")[2] for name in clean.names])
     grown = np.sqrt(np.diag(beside.estimate.covariance)) / sigma
     np.testing.assert_array_less(grown[others], 1.1)
-    np.testing.assert_array_less(grown, 4.0)
+    np.testing.assert_array_less(grown, 2.0)
+
+
+def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attitudes(options):
+    """Stops do not come back then: by them three false effects were certain, and scale factors 12 sigma off."""
+    wave = unit_set(41, [short("kim18_signed"), short("recommended")], ("accel_x: sin(7 fx/g + 4 fy/g)=40 ug",))
+    found = diagnose_set(wave.members, options, here)
+    assert found.recurrence is not None
+    assert found.recurrence.answer == ()
+    assert found.verdict == Verdict.UNEXPLAINED
+    assert found.findings == ()
+    assert all(f.label in found.sentence for f in found.refused)
+    assert len(found.refused) > 0
+    assert any(
+        note.startswith("estimated beside an unknown function of the attitude in accel_x") for note in found.after.notes
+    )
+    z = z_of_result(found.after, wave)
+    assert np.sqrt(np.mean(z**2)) < 1.3
+    # What a plan for the next recording begins with knows no more than the result.
+    known = found.standing.known
+    place = {name: k for k, name in enumerate(known.names)}
+    alone = np.linalg.inv(known.J + np.diag(1.0 / known.prior**2))
+    of_unit = [k for k, name in enumerate(found.after.names) if name.startswith("gyro_scale")]
+    told = np.sqrt(np.diag(found.after.covariance))[of_unit]
+    again = np.sqrt(np.diag(alone))[[place[found.after.names[k]] for k in of_unit]]
+    np.testing.assert_allclose(again, told, rtol=0.05)

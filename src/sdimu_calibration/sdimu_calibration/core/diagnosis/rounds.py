@@ -102,7 +102,7 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
     Returns
     -------
     request : Request
-        With functions of the attitude in its wander, where these were looked for.
+        With functions of the attitude in its wander, where the last round had them.
     done : Round
         The last one; its fit holds what it chose.
     """
@@ -116,11 +116,11 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
         if done.wants_equations and not own and not asked:
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
-            request = with_attitude_functions(request, done.found)
-            wider = next_ground(request, ground.fit, ground.tried, True, done.found, ground.free)
-            wide = run_round(request, wider, True, limits, done)
+            exact = with_attitude_functions(request, done.found)
+            wider = next_ground(exact, ground.fit, ground.tried, True, done.found, ground.free)
+            wide = run_round(exact, wider, True, limits, done)
             if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
-                done, own = wide, True
+                request, done, own = exact, wide, True
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
         if stood:
             break

@@ -1,6 +1,6 @@
 """Whether an error that follows the attitude is worth a search in which every sample sees it where it is.
 
-Its mean over a stretch is worked out in every search; exact are functions of the attitude, some hundred columns more.
+Every search tries its mean over each stretch. Functions of the attitude are exact, and cost some hundred columns more.
 """
 
 from __future__ import annotations

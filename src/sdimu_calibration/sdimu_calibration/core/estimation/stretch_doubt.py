@@ -55,8 +55,8 @@ def _biases(names: Sequence[str], cut: Stretches, at: Span) -> Floats:
     """Return the map from the mean errors of all stretches to the biases in a span of time, shape (q, 6 n)."""
     inside = np.clip(np.minimum(cut.end, at[1]) - np.maximum(cut.start, at[0]), 0.0, None)
     share = inside / inside.sum()
-    out = np.zeros((len(names), cut.cells, 6))
+    out = np.zeros((len(names), len(cut), 6))
     for channel, name in enumerate(bias.NAMES):
         if name in names:
-            out[names.index(name), : len(cut), channel] = share
+            out[names.index(name), :, channel] = share
     return out.reshape(len(names), -1)

@@ -16,8 +16,8 @@ from sdimu_calibration.core.noise_term import ATTITUDE, RATE, TEMPERATURE
 
 _SMOOTH = (0.3, 0.9)
 """Distances of two directions of force (1) over which an unknown function of them changes, half of its variance each:
-17 deg is less than what lies between two attitudes of a plan, and finer waves are ten times as likely with it as with
-half as much again; 52 deg gives a function that a coefficient takes up in part the size that it may have."""
+17 deg is less than what lies between two attitudes of a plan; with 26 deg waves of 6 to 9 rad/g lose 5 to 26 of their
+log-likelihood. 52 deg gives the part of a function that coefficients take up the size that it may have."""
 _RATES = 0.3
 """Share of the largest rate (1) over which an unknown function of the rate changes: the senses of a turn lie apart, and
 so do 2 and 10 deg/s."""

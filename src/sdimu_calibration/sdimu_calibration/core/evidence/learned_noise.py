@@ -457,7 +457,7 @@ def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
 
 
 def _triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> Floats:
-    """Square root of the covariance of the terms of a triad for one of its sensors, shape (n, r)."""
+    """Square root of the covariance of the terms of a triad for one of its sensors, shape (n, r), of n cells."""
     parts = [t.size * cut.mode(t.kind, t.tau) for t in terms if t.triad == triad and t.size > 0.0]
     return np.hstack(parts) if parts else np.zeros((cut.cells, 0))
 

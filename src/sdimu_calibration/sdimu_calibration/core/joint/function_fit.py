@@ -1,7 +1,7 @@
 """A joint fit with an unknown function of the attitude that all recordings have in common.
 
-Where what a set leaves unexplained comes back at the same attitude, it belongs to the sensor. The weights of the
-function are parameters of all recordings, and are integrated out of the coefficients; their size is the likeliest one.
+Where a set leaves something that such a function explains, it belongs to the sensor. The weights of the function are
+parameters of all recordings, and are integrated out of the coefficients; their size is the likeliest one.
 """
 
 from __future__ import annotations
@@ -16,11 +16,10 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.attitude_functions import covering
 from sdimu_calibration.core.joint.combine import Combination, Rows
 from sdimu_calibration.core.joint.leftovers import with_places
-from sdimu_calibration.core.joint.member import Job, Report
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, columns_of, grouped_rows, with_own
+from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, columns_of, grouped_rows
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
-from sdimu_calibration.core.recording import DataError
 
 _MOST = 150
 """Number of functions at most: several plans together cover more of the sphere than one."""
@@ -67,10 +66,10 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
     places = [r.places for r in with_places(fit, run) if r.places is not None]
     functions = covering(np.vstack([p.up for p in places]), np.vstack([p.way for p in places]), _MOST)
     shared = SharedFunction(functions, tuple(c for c in CHANNELS if c in sensors), {})
-    reports = _asked(fit, shared, run)
+    reports = asked_again(fit, run, noise=(), function=shared)
     for _ in range(_LEARNINGS):
         shared = replace(shared, size=_sizes(fit, reports, shared))
-        reports = _asked(fit, shared, run)
+        reports = asked_again(fit, run, noise=(), function=shared)
     shared = replace(shared, size=_sizes(fit, reports, shared))
     gain = _likelihood(fit, reports, shared) - _likelihood(fit, reports, _tiny(fit, reports, shared))
     return Beside(_estimated(fit, reports, shared), tuple(reports), shared, gain)
@@ -114,34 +113,23 @@ def _without(beside: Beside, names: Sequence[str]) -> float:
     fit, shared = beside.fit, beside.shared
     if shared is None:
         raise AssertionError("a function is needed")
-    at = [k for k, name in enumerate(fit.names) if name not in names]
-    less = replace(fit, names=tuple(fit.names[k] for k in at), weight=fit.weight[at])
+    less = _fit_without(fit, names)
     sized = replace(shared, size=_sizes(less, beside.reports, shared))
     return _likelihood(less, beside.reports, sized)
 
 
-def _asked(fit: SetFit, shared: SharedFunction, run: Run) -> list[Report]:
-    """Ask for rows about the joint estimate with the functions, in noise learned beside them once they have a size."""
-    jobs = [
-        Job(
-            member,
-            fit.model,
-            report.estimator,
-            tuple(fit.local.get(member.name, ())),
-            about=fit.values_of(report),
-            imu=report.imu,
-            start=report.start,
-            noise=(),
-            function=shared,
-        )
-        for member, report in zip(fit.members, fit.reports, strict=True)
-    ]
-    reports = []
-    for fresh, old in zip(run(jobs), fit.reports, strict=True):
-        if isinstance(fresh, DataError):
-            raise fresh
-        reports.append(with_own(fresh, old))
-    return reports
+def _fit_without(fit: SetFit, names: Sequence[str]) -> SetFit:
+    """Leave coefficients out of what a likelihood asks of a fit: names, weights, what varies and by how much."""
+    at = [k for k, name in enumerate(fit.names) if name not in names]
+    own = {effect: tuple(n for n in each if n not in names) for effect, each in fit.varying.items()}
+    scatter = [t for t, each in zip(fit.turn_on, own.values(), strict=False) if each]
+    return replace(
+        fit,
+        names=tuple(fit.names[k] for k in at),
+        weight=fit.weight[at],
+        varying={effect: each for effect, each in own.items() if each},
+        turn_on=tuple(scatter),
+    )
 
 
 def _sizes(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:

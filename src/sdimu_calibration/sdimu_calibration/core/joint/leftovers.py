@@ -16,10 +16,9 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.combine import stacked
-from sdimu_calibration.core.joint.member import Job, Report
+from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_evidence import white_power_on
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, power_on, with_own
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, power_on
 
 ATTITUDE, TIME, TEMPERATURE = "attitude", "time", "temperature"
 KINDS = (ATTITUDE, TIME, TEMPERATURE)
@@ -137,26 +136,7 @@ def with_places(fit: SetFit, run: Run) -> list[Report]:
     # Spread over the set where it holds more than are asked.
     asked = set(np.unique(np.linspace(0, len(columns) - 1, min(most, len(columns))).round().astype(int)).tolist())
     places = [k for k in range(len(columns)) if k in asked]
-    jobs = [
-        Job(
-            fit.members[k],
-            fit.model,
-            fit.reports[k].estimator,
-            tuple(fit.local.get(fit.members[k].name, ())),
-            about=fit.values_of(fit.reports[k]),
-            imu=fit.reports[k].imu,
-            start=fit.reports[k].start,
-            noise=fit.reports[k].noise,
-            stretches=True,
-        )
-        for k in places
-    ]
-    reports = list(fit.reports)
-    for k, fresh in zip(places, run(jobs), strict=True):
-        if isinstance(fresh, DataError):
-            raise fresh
-        reports[k] = with_own(fresh, fit.reports[k])
-    return reports
+    return asked_again(fit, run, places, stretches=True)
 
 
 def _own(report: Report) -> Floats:

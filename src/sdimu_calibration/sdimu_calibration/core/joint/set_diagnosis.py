@@ -39,8 +39,8 @@ _STILL_WRONG = 1.25
 """Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
 reach it: 1 is right."""
 _SHARED = 10.0
-"""Log-likelihood (1) that a function of the attitude must add to what is left: its odds and those of its size are far
-better."""
+"""Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
+its size cost less."""
 _LISTED = 4
 """Number of effects that a sentence names: the table has the rest."""
 
@@ -185,7 +185,6 @@ def _beside_function(
     board, fit = found.posterior.board, found.after
     number = {found.posterior.candidate(k).label: k for k in range(len(board.use))}
     names = {c.label: fit.names[place_of(fit.names, c)] for c in found.chosen if c.label in number}
-    names = {label: name for label, name in names.items() if name not in fit.varying_names}
     labels = needless(beside, names, lambda kept: board.prior.log_of([number[label] for label in kept]))
     if labels:
         found = taken_back(found, options, run, labels)

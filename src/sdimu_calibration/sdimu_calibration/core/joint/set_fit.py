@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -264,6 +265,26 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
     return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())
+
+
+def asked_again(fit: SetFit, run: Run, places: Sequence[int] | None = None, **wanted: Any) -> list[Report]:
+    """Ask recordings for other rows about the joint estimate, in the noise that they have.
+
+    Parameters
+    ----------
+    places : sequence of int, optional
+        Of the reports that are asked, all without; the others stay as they are.
+    wanted : object
+        What a `Job` has besides.
+    """
+    options, asked = SetOptions(fit.model, local=fit.local), range(len(fit.reports)) if places is None else places
+    jobs = [replace(job_of(fit.members[k], options, fit, learn=False), **wanted) for k in asked]
+    reports = list(fit.reports)
+    for k, fresh in zip(asked, run(jobs), strict=True):
+        if isinstance(fresh, DataError):
+            raise fresh
+        reports[k] = with_own(fresh, fit.reports[k])
+    return reports
 
 
 def with_own(fresh: Report, old: Report | None) -> Report:

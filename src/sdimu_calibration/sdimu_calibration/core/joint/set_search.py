@@ -22,15 +22,14 @@ from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
-from sdimu_calibration.core.joint.member import Job, Member, Report
+from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, fit_set, with_own, with_reports
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
 from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.posterior.told import of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
-from sdimu_calibration.core.recording import DataError
 
 _MOST_ROUNDS = 12
 """Number of rounds at most: strong effects take one each, with one more that sharpens it; the others come together."""
@@ -300,30 +299,8 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
 
 def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     """Return the fit with the signatures of effects in its reports."""
-    effects = tuple(map(by_name, tried))
-    jobs = [
-        Job(
-            member,
-            fit.model,
-            report.estimator,
-            tuple(fit.local.get(member.name, ())),
-            effects,
-            True,
-            fit.values_of(report),
-            report.imu,
-            report.start,
-            report.noise,
-        )
-        for member, report in zip(fit.members, fit.reports, strict=True)
-    ]
-    done = run(jobs)
-    reports: list[Report] = []
-    for old, fresh in zip(fit.reports, done, strict=True):
-        if isinstance(fresh, DataError):
-            raise fresh
-        reports.append(with_own(fresh, old))
     # The search looks at what is left of these rows, not of those before.
-    return with_reports(fit, reports)
+    return with_reports(fit, asked_again(fit, run, candidates=tuple(map(by_name, tried)), with_local=True))
 
 
 def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
