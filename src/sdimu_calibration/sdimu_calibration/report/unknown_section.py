@@ -30,8 +30,9 @@ def unknown_section(diagnosis: Diagnosis, draw: Draw) -> str:
     return section(
         f"An error that follows the {' and the '.join(dict.fromkeys(one.follows for one in found))}",
         quiet(
-            f"No effect of the catalogue explains it. Error of each sensor with 95 % bands, {drawn}: what bends here "
-            "is a term of that axis, what scatters hangs on another axis or on the way there."
+            f"No effect of the catalogue explains it. Error of each sensor with 95 % bands, {drawn}, without what "
+            "the coefficients take up: what bends here is a term of that axis, what scatters hangs on another axis or "
+            "on the way there."
         ),
         *(draw(followed(one)) for one in found),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.joint.function_fit import with_function
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
@@ -77,6 +78,9 @@ def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attit
     assert found.recurrence.answer == ()
     assert found.verdict == Verdict.UNEXPLAINED
     assert found.findings == ()
+    # Those of a search that knew no function would name what it took back.
+    assert found.probabilities is None
+    assert found.advice[0].kind == Kind.TRY_FORCE_EQUATION
     assert all(f.label in found.sentence for f in found.refused)
     assert len(found.refused) > 0
     assert any(

@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.attitude_functions import covering
 from sdimu_calibration.core.joint.combine import Combination, Rows
 from sdimu_calibration.core.joint.leftovers import with_places
 from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.set_evidence import own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, columns_of, grouped_rows
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
@@ -81,7 +82,7 @@ def needless(beside: Beside, effects: Mapping[str, str], log_prior: Callable[[Se
     Parameters
     ----------
     effects : mapping of str to str
-        Names of coefficients of the fit by label.
+        Names of coefficients of the fit by label, those of one recording among them.
     log_prior : callable
         Of labels to the log of their prior over that of none (1).
 
@@ -113,9 +114,20 @@ def _without(beside: Beside, names: Sequence[str]) -> float:
     fit, shared = beside.fit, beside.shared
     if shared is None:
         raise AssertionError("a function is needed")
-    less = _fit_without(fit, names)
-    sized = replace(shared, size=_sizes(less, beside.reports, shared))
-    return _likelihood(less, beside.reports, sized)
+    less, reports = _fit_without(fit, names), [_rows_without(r, fit, names) for r in beside.reports]
+    sized = replace(shared, size=_sizes(less, reports, shared))
+    return _likelihood(less, reports, sized)
+
+
+def _rows_without(report: Report, fit: SetFit, names: Sequence[str]) -> Report:
+    """Give a recording the value of all others where it loses the one of its own."""
+    common = {fit.names[own]: fit.names[shared] for own, shared in own_values(fit.names) if fit.names[own] in names}
+    rows = report.reduction
+    return (
+        replace(report, reduction=replace(rows, names=tuple(common.get(n, n) for n in rows.names)))
+        if common
+        else report
+    )
 
 
 def _fit_without(fit: SetFit, names: Sequence[str]) -> SetFit:

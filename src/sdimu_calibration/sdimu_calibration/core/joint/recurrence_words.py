@@ -53,8 +53,16 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     return f"{what}{where} does not come back at the same {_listed(found.told, 'or')}{of_each}."
 
 
-def next_steps(found: Recurrence | None) -> list[Advice]:
-    """Say what to do about what comes back, the most useful first."""
+def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]:
+    """Say what to do about what comes back, the most useful first.
+
+    Parameters
+    ----------
+    function : bool
+        An unknown function of the attitude explains it, whether or not the stops come back.
+    """
+    if function:
+        return [_NEXT[ATTITUDE]]
     if found is None:
         return []
     if found.answer:

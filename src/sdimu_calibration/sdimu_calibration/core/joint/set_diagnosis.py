@@ -20,11 +20,11 @@ from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
-from sdimu_calibration.core.joint.scope import tagged
+from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance, own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
-from sdimu_calibration.core.joint.set_search import SetSearch, place_of, search_set, taken_back
+from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
@@ -78,6 +78,11 @@ class SetFinding:
     probability: float = float("nan")
     against: str = ""
 
+    @property
+    def tag(self) -> str:
+        """Label, of one recording with its name behind."""
+        return tagged(self.label, self.recording) if self.recording else self.label
+
 
 @dataclass(frozen=True)
 class SetDiagnosis:
@@ -98,7 +103,8 @@ class SetDiagnosis:
     refused : tuple of SetFinding
         Effects that were found and taken back, as recordings held out fit worse with them.
     probabilities : Probabilities or None
-        Of nothing, and of each family of effects in all recordings, at the end of the search.
+        Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
+        function of the attitude explains what is left, which the search did not know.
     error_without : float or None
         Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
         them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
@@ -151,13 +157,16 @@ def diagnose_set(
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
         found, needed_not = _beside_function(found, beside, again, options, run)
-        refused += tuple(f for f in findings if f.label in needed_not and not f.recording)
+        refused += tuple(
+            f for f in findings if (tagged(f.label, f.recording) if f.recording else f.label) in needed_not
+        )
         why = f"{why} {_explained(again.sensors, needed_not)}".strip()
         after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
-    sentence = f"{_sentence(word, findings, (without, after), again, found.after.function is not None)} {why}".strip()
+    beside_function = found.after.function is not None
+    sentence = f"{_sentence(word, findings, (without, after), again, beside_function)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -165,13 +174,13 @@ def diagnose_set(
         before,
         after,
         found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test), again),
+        _advice(word, findings, next_recording(found.after, standing, test), next_steps(again, beside_function)),
         standing,
         found.first,
         again,
         refused,
         without,
-        probabilities(found.posterior),
+        None if beside_function else probabilities(found.posterior),
     )
 
 
@@ -185,6 +194,7 @@ def _beside_function(
     board, fit = found.posterior.board, found.after
     number = {found.posterior.candidate(k).label: k for k in range(len(board.use))}
     names = {c.label: fit.names[place_of(fit.names, c)] for c in found.chosen if c.label in number}
+    names |= {one.label: fit.names[place_of_local(fit.names, one)] for one in found.local if one.label in number}
     labels = needless(beside, names, lambda kept: board.prior.log_of([number[label] for label in kept]))
     if labels:
         found = taken_back(found, options, run, labels)
@@ -193,10 +203,11 @@ def _beside_function(
 
 
 def _explained(sensors: Sequence[str], labels: Sequence[str]) -> str:
-    """Say what an unknown function explains."""
-    too = f"; it explains {', '.join(labels)}, too, which are not told" if labels else ""
+    """Say what an unknown function explains; labels of one recording have its name behind."""
+    names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
+    too = f" It also explains {', '.join(names)}: not told." if names else ""
     return (
-        f"An unknown function of the attitude in {' and '.join(sensors)} explains it, the same in all recordings{too}."
+        f"An unknown function of the attitude in {' and '.join(sensors)}, the same in all recordings, explains it.{too}"
     )
 
 
@@ -222,8 +233,7 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     for find in found.local:
         effect = resolve(find.key)
         parameter = effect.parameters[0]
-        called = (tagged(name, find.recording) for name in (find.key, parameter.name))
-        place = next(names.index(name) for name in called if name in names)
+        place = place_of_local(names, find)
         title = f"{effect.title}, changed" if is_change(find.key) else effect.title
         own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability))
     recordings = [report.name for report in found.after.reports]
@@ -369,9 +379,9 @@ def _advice(
     word: Verdict,
     findings: Sequence[SetFinding],
     closing: Sequence[tuple[tuple[str, ...], NextTurn]],
-    again: Recurrence | None,
+    steps: Sequence[Advice],
 ) -> tuple[Advice, ...]:
-    out = next_steps(again)
+    out = [*steps]
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.against:

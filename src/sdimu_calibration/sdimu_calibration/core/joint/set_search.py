@@ -61,6 +61,11 @@ class LocalFind:
     z: float
     probability: float
 
+    @property
+    def label(self) -> str:
+        """Key with the name of the recording behind it."""
+        return tagged(self.key, self.recording)
+
 
 @dataclass(frozen=True)
 class SetSearch:
@@ -240,19 +245,18 @@ def _first_ones(fit: SetFit, found: Search[SetEvidence], told: Sequence[Candidat
 
 
 def taken_back(found: SetSearch, options: SetOptions, run: Run, labels: Sequence[str]) -> SetSearch:
-    """Return the search as if it had not chosen some effects of all recordings.
+    """Return the search as if it had not chosen some effects.
 
     Parameters
     ----------
-    found : SetSearch
-        What it found in one recording alone stays.
     run : callable
         Does the jobs.
     labels : sequence of str
-        Of the effects.
+        Of the effects, with the name of the recording behind those of one.
     """
     kept = [c for c in found.chosen if c.label not in labels]
-    own = [replace(_of_one(tagged(one.key, one.recording)), recording=one.recording) for one in found.local]
+    local = tuple(one for one in found.local if one.label not in labels)
+    own = [_of_one(one.label) for one in local]
     fit = found.before
     if kept or own:
         fit = fit_set(fit.members, _with(options, [*kept, *own]), run, fit)
@@ -261,7 +265,8 @@ def taken_back(found: SetSearch, options: SetOptions, run: Run, labels: Sequence
     standing = found.standing if kept else set_standing(fit, set_evidence(fit, ()), {}, {})
     z = tuple(z for c, z in zip(found.chosen, found.z, strict=True) if c.label in shared)
     probability = {label: found.probability[label] for label in shared}
-    return replace(found, after=fit, chosen=tuple(kept), z=z, alike=alike, probability=probability, standing=standing)
+    told = replace(found, after=fit, chosen=tuple(kept), z=z, alike=alike, probability=probability)
+    return replace(told, local=local, standing=standing)
 
 
 def _singles(evidence: SetEvidence) -> Ints:
@@ -329,6 +334,12 @@ def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], 
         if own is not None:
             return tuple(c.label for c in together if c.coefficient != own.coefficient), found.of_class(place)
     return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0)
+
+
+def place_of_local(names: Sequence[str], find: LocalFind) -> int:
+    """Place among those of a fit of a coefficient that was found in one recording."""
+    called = (tagged(name, find.recording) for name in (find.key, selection.resolve(find.key).parameters[0].name))
+    return next(list(names).index(name) for name in called if name in names)
 
 
 def place_of(names: Sequence[str], candidate: Candidate) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import FOLLOWS, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
 
@@ -27,7 +27,8 @@ class UnknownFunction:
         What it follows: mean direction of the specific force in b (1), body rate (rad/s), or temperature (K).
     turning : ndarray of bool, shape (n,)
     mean, sigma : ndarray, shape (n, 3)
-        Error of each axis and its sigma (SI); about its mean over the dwells, which is a bias.
+        Error of each axis and its sigma (SI); without its mean over the dwells, which is a bias, and of one of the
+        attitude without what is linear in the force, which is in scale factors, misalignments and mass unbalances.
     """
 
     triad: str
@@ -66,7 +67,12 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
             continue
         R = one.R[:, columns].reshape(cut.cells, 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
         R = np.einsum("sn,ncr->scr", cut.at_stretches(term.kind), R)
-        R = R - np.einsum("s,scr->cr", share, R)[None]
+        taken = np.ones((len(cut), 1))
+        if term.kind == ATTITUDE:
+            taken = np.column_stack([taken, known.force])
+        R = R - np.einsum(
+            "st,tcr->scr", taken @ np.linalg.pinv(taken.T @ (share[:, None] * taken)) @ (taken.T * share), R
+        )
         variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
         x, mean = known.variable(term.kind), R @ mode[columns]
         out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance)))
