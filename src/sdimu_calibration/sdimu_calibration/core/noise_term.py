@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 RANDOM_WALK = "random_walk"
 FLICKER = "flicker"
@@ -32,6 +33,10 @@ WORDS = {
 }
 _ACCEL_WALK = "acceleration random walk"
 TRIADS = ("gyro", "accel")
+AXES = (0, 1, 2)
+"""Sensors of a triad, by axis."""
+Identity: TypeAlias = tuple[str, str, float, tuple[int, ...]]
+"""What a term is, its size aside: triad, kind, time constant (s), sensors."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,9 @@ class NoiseTerm:
         Log-likelihood that the term adds.
     alike : tuple of str
         Kinds that the data cannot tell from it.
+    axes : tuple of int
+        Sensors of the triad that have it, each a draw of its own, ascending: all but of an unknown function, which may
+        be of one.
     """
 
     triad: str
@@ -64,6 +72,17 @@ class NoiseTerm:
     high: float = 0.0
     gain: float = 0.0
     alike: tuple[str, ...] = ()
+    axes: tuple[int, ...] = AXES
+
+    @property
+    def identity(self) -> Identity:
+        """What the term is, its size aside."""
+        return self.triad, self.kind, self.tau, self.axes
+
+    @property
+    def where(self) -> str:
+        """Name of the triad, or of its sensors that have the noise."""
+        return self.triad if self.axes == AXES else f"{self.triad} {' and '.join('xyz'[axis] for axis in self.axes)}"
 
     @property
     def is_drawn(self) -> bool:
@@ -74,7 +93,7 @@ class NoiseTerm:
     def words(self) -> str:
         """Name the term as people do."""
         word = _ACCEL_WALK if (self.triad, self.kind) == ("accel", RANDOM_WALK) else WORDS[self.kind]
-        return f"{self.triad} {word}" + (f" of {self.tau:.0f} s" if self.tau else "")
+        return f"{self.where} {word}" + (f" of {self.tau:.0f} s" if self.tau else "")
 
     @property
     def unit(self) -> str:

@@ -45,15 +45,15 @@ def unknown_of(diagnosis: Diagnosis) -> tuple[UnknownFunction, ...]:
 
 
 def followed(found: UnknownFunction) -> Figure:
-    """Error of each axis of a triad against each component of what it follows, a panel each."""
+    """Error of each sensor that has it against each component of what it follows, a panel each."""
     name, unit = _NAMES[found.triad]
     title, factor, _ = _FOLLOWED[found.follows]
     at = found.turning if found.follows == RATE else ~found.turning
     columns = found.variable.shape[1]
-    figure = Figure(rows=3, cols=columns, share_x=True, share_y=True, gap_x=0.03, gap_y=0.05)
-    for row in range(3):
-        value = from_si(1.0, unit) * found.mean[at, row]
-        band = 1.96 * from_si(1.0, unit) * found.sigma[at, row]
+    figure = Figure(rows=len(found.axes), cols=columns, share_x=True, share_y=True, gap_x=0.03, gap_y=0.05)
+    for row, axis in enumerate(found.axes):
+        value = from_si(1.0, unit) * found.mean[at, axis]
+        band = 1.96 * from_si(1.0, unit) * found.sigma[at, axis]
         for col in range(columns):
             figure.add(
                 "scatter",
@@ -62,12 +62,12 @@ def followed(found: UnknownFunction) -> Figure:
                 mode="markers",
                 showlegend=False,
                 error_y={"array": band, "color": MUTED, "thickness": 1, "width": 0},
-                marker={"color": f"@{_AXES[row]}", "size": 6},
-                hovertemplate=f"{found.triad} {_AXES[row]}: %{{y:.3g}} {unit}<extra></extra>",
+                marker={"color": f"@{_AXES[axis]}", "size": 6},
+                hovertemplate=f"{found.triad} {_AXES[axis]}: %{{y:.3g}} {unit}<extra></extra>",
                 row=row + 1,
                 col=col + 1,
             )
-            if row == 2:
-                figure.x_axes(title=title.format(_AXES[col]), row=3, col=col + 1)
-        figure.y_axes(title=f"{_AXES[row]} ({unit})", row=row + 1, col=1)
-    return lay_out(figure, 620, title=name, margin={"l": 70, "r": 20, "t": 50, "b": 55})
+            if axis == found.axes[-1]:
+                figure.x_axes(title=title.format(_AXES[col]), row=row + 1, col=col + 1)
+        figure.y_axes(title=f"{_AXES[axis]} ({unit})", row=row + 1, col=1)
+    return lay_out(figure, 155 + 155 * len(found.axes), title=name, margin={"l": 70, "r": 20, "t": 50, "b": 55})

@@ -9,7 +9,16 @@ import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.conditions import Conditions
-from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, learn, likelihood
+from sdimu_calibration.core.evidence.learned_noise import (
+    NoiseInformation,
+    Wander,
+    columns_of,
+    given_terms,
+    learn,
+    likelihood,
+    root_of,
+    sizes_on_grid,
+)
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, RATE, TEMPERATURE, TRIADS, NoiseTerm
 
@@ -186,3 +195,53 @@ def test_a_test_that_begins_in_a_turn_shifts_by_it(cut):
     K = kernel("shift", 0.0, begun)
     assert np.linalg.eigvalsh(K)[0] > -1e-9
     assert K[0, 0] == 0.5
+
+
+def of_some_sensors(cut):
+    """Terms of two sensors of each triad and of a whole triad, beside one of another sensor, on any information."""
+    terms = (
+        NoiseTerm("accel", MARKOV, 100.0, 2.0, axes=(1,)),
+        NoiseTerm("gyro", "random_walk", 0.0, 0.2),
+        NoiseTerm("accel", "stop", 0.0, 1.5),
+        NoiseTerm("gyro", "shift", 0.0, 0.7, axes=(0, 2)),
+    )
+    rng = np.random.default_rng(5)
+    W = rng.standard_normal((400, 6 * len(cut)))
+    information = NoiseInformation(W.T @ W / 400.0, W.T @ rng.standard_normal(400) / 20.0, 0.0)
+    return terms, information
+
+
+def covariance(cut, terms):
+    """Covariance of the mean errors by the kernels, cell by sensor."""
+    K = np.zeros((len(cut), 6, len(cut), 6))
+    for term in terms:
+        for axis in term.axes:
+            channel = 3 * TRIADS.index(term.triad) + axis
+            K[:, channel, :, channel] += term.size**2 * kernel(term.kind, term.tau, cut)
+    return K.reshape(6 * len(cut), -1)
+
+
+def test_noise_of_one_sensor_is_in_that_sensor_alone(cut):
+    terms, _ = of_some_sensors(cut)
+    R, columns = root_of(terms, cut), columns_of(terms, cut)
+    np.testing.assert_allclose(R @ R.T, covariance(cut, terms), atol=1e-5)
+    assert sorted(np.concatenate(columns).tolist()) == list(range(R.shape[1]))
+    for term, own in zip(terms, columns, strict=True):
+        np.testing.assert_allclose(R[:, own] @ R[:, own].T, covariance(cut, [term]), atol=1e-5)
+
+
+def test_what_noise_of_some_sensors_adds_is_that_of_the_whole_covariance(cut):
+    """Beside other terms, against the dense likelihood."""
+    terms, information = of_some_sensors(cut)
+    one, *others = terms
+    size, gain = sizes_on_grid(*given_terms(information, cut, others, "accel"), cut, one)
+    near = int(np.argmin(np.abs(np.log(size / one.size))))
+    with_it = (replace(one, size=float(size[near])), *others)
+
+    def dense(members):
+        K = covariance(cut, members)
+        M = np.eye(len(K)) + K @ information.J
+        return 0.5 * information.d @ np.linalg.solve(M, K @ information.d) - 0.5 * np.linalg.slogdet(M)[1]
+
+    assert gain[near] == pytest.approx(dense(with_it) - dense(others), abs=1e-4)
+    assert likelihood(information, cut, with_it) == pytest.approx(dense(with_it), abs=1e-4)

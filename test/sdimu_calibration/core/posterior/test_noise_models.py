@@ -55,7 +55,7 @@ def told(information, cut, usual):
     weight = np.exp(np.array([score for score, _ in found]) - found[0][0])
     out = {(t.triad, t.kind): 0.0 for t in TRIED}
     for w, (_, noise) in zip(weight / weight.sum(), found, strict=True):
-        for triad, kind, _ in noise.kinds:
+        for triad, kind, *_ in noise.kinds:
             out[triad, kind] += w
     return out
 

@@ -23,13 +23,13 @@ def drawn(bench):
 
 
 def with_function(bench, kind, axes, size, seed=1):
-    """White noise and a smooth function of what a kind follows in each sensor of a triad, on signatures of a fit."""
+    """White noise and a smooth function of what a kind follows in each of some sensors, on signatures of a fit."""
     fit = bench.fit(5, (), "recommended")
     ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False)
     evidence, wander, rng = ground.evidence, fit.wander, np.random.default_rng(seed)
     root = wander.cut.mode(kind, 0.0)
     error = np.zeros((len(wander.cut), 6))
-    error[:, axes] = size * root @ rng.standard_normal((root.shape[1], 3))
+    error[:, axes] = size * root @ rng.standard_normal((root.shape[1], len(range(*axes.indices(6)))))
     e = rng.standard_normal(len(evidence.e)) + wander.U @ error.ravel()
     known = replace(evidence.information, d=evidence.W.T @ e)
     seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
@@ -59,6 +59,19 @@ def test_the_function_that_is_drawn_is_the_hidden_one_within_its_band(drawn):
         squares.append(np.mean(((told - hidden) / one.sigma[rest]) ** 2))
     # Nine draws (a function an axis) of some nine degrees of freedom each: the root scatters by .08 about one.
     assert 0.6 < np.sqrt(np.mean(squares)) < 1.4
+
+
+def test_an_error_of_one_sensor_is_told_of_that_sensor_alone(bench):
+    found, _, _ = with_function(bench, ATTITUDE, slice(4, 5), 25.0 * UG)
+    (term,) = found.noise
+    assert (term.triad, term.kind, term.axes) == ("accel", ATTITUDE, (1,))
+    assert term.words == "accel y error that follows the attitude"
+    assert term.size == pytest.approx(25.0 * UG, rel=0.4)
+    (one,) = unknown_functions(found.posterior, found.noise)
+    assert one.axes == (1,)
+    assert one.sigma[:, 1].min() > 0.0
+    np.testing.assert_array_equal(one.mean[:, [0, 2]], 0.0)
+    assert not len(found.chosen)
 
 
 def test_white_noise_has_none(bench):

@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander, given_terms, sizes_on_grid
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import ONE_OR_ALL
 
 _GAIN = 4.0
 """Log-likelihood (1) from which functions of the attitude are looked at: their odds make up for as much."""
@@ -48,7 +49,7 @@ def with_attitude_functions(request: Request, found: Search[LinearEvidence]) -> 
 
 
 def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequence[NoiseTerm]) -> float:
-    """Log-likelihood that an error which follows the attitude adds in the triad that shows it best (1).
+    """Log-likelihood that an error which follows the attitude adds in the sensor or triad that shows it best (1).
 
     Parameters
     ----------
@@ -59,7 +60,10 @@ def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequenc
     """
     information = Joint.of(known, wander).on_wander(np.arange(len(weight)), weight)
     gains = [
-        sizes_on_grid(*given_terms(information, wander.cut, beside, t), wander.cut, NoiseTerm(t, ATTITUDE))[1]
+        sizes_on_grid(*given_terms(information, wander.cut, beside, t), wander.cut, NoiseTerm(t, ATTITUDE, axes=axes))[
+            1
+        ]
         for t in TRIADS
+        for axes in ONE_OR_ALL
     ]
     return float(np.max(np.concatenate(gains), initial=0.0))

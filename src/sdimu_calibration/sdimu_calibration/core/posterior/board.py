@@ -278,5 +278,5 @@ def same_noise(one: NoiseModel, other: NoiseModel, ratio: float = 1.35) -> bool:
     """Whether two noises have the same terms, of sizes within a factor."""
     if one.kinds != other.kinds:
         return False
-    sizes = {(t.triad, t.kind, t.tau): t.size for t in other.terms}
-    return all(1.0 / ratio < t.size / sizes[t.triad, t.kind, t.tau] < ratio for t in one.terms)
+    sizes = {t.identity: t.size for t in other.terms}
+    return all(1.0 / ratio < t.size / sizes[t.identity] < ratio for t in one.terms)

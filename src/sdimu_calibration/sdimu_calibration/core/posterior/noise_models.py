@@ -23,6 +23,7 @@ from sdimu_calibration.core.evidence.learned_noise import (
 )
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import (
+    AXES,
     DRAWN,
     FLICKER,
     FOLLOWS,
@@ -32,6 +33,7 @@ from sdimu_calibration.core.noise_term import (
     STOP,
     TRIADS,
     TURN,
+    Identity,
     NoiseTerm,
 )
 from sdimu_calibration.core.side_by_side import side_by_side
@@ -84,6 +86,8 @@ _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
+ONE_OR_ALL = (AXES, *((axis,) for axis in AXES))
+"""Sensors of a triad that an unknown function is of, likely alike: what causes it is of one sensor or of all."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +106,9 @@ class NoiseModel:
     log_prior: float = 0.0
 
     @property
-    def kinds(self) -> frozenset[tuple[str, str, float]]:
-        """Triad, kind and time constant of each term."""
-        return frozenset((t.triad, t.kind, t.tau) for t in self.terms)
+    def kinds(self) -> frozenset[Identity]:
+        """What each term is, its size aside."""
+        return frozenset(t.identity for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -172,11 +176,13 @@ class _Search:
     ) -> None:
         self.information, self.cut, self.usual = information, cut, usual
         follows = () if cut.conditions is None else cut.conditions.followed
-        every = [*kinds(cut), *(NoiseTerm(triad, kind) for triad in TRIADS for kind in follows)]
+        unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in ONE_OR_ALL]
+        every = [*kinds(cut), *unknown]
         self.tried = every if tried is None else list(tried)
         markov = sum(t.kind == MARKOV for t in every) // len(TRIADS)
-        self.log_odds = {kind: float(np.log(odds / (markov if kind == MARKOV else 1))) for kind, odds in ODDS.items()}
-        self.seen: dict[frozenset[tuple[str, str, float]], _Found] = {}
+        variants = {MARKOV: markov, **dict.fromkeys(FOLLOWS, len(ONE_OR_ALL))}
+        self.log_odds = {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
+        self.seen: dict[frozenset[Identity], _Found] = {}
 
     def keep(self, found: _Found) -> _Found:
         """Remember a noise."""
@@ -190,8 +196,8 @@ class _Search:
         terms = base.noise.terms
         room = []
         for term in self.tried:
-            own = [t.kind for t in terms if t.triad == term.triad]
-            if len(own) < _MOST_TERMS and term.kind not in own and not (terms and not own and self._hopeless(term)):
+            own = _of_triad(NoiseModel(terms), term.triad)
+            if len(own) < _MOST_TERMS and not _is_in(term, own) and not (terms and not own and self._hopeless(term)):
                 room.append(term)
         given = {name: given_terms(self.information, self.cut, terms, name) for name in {t.triad for t in room}}
         sized = side_by_side(lambda term: self.sized(*given[term.triad], term), room)
@@ -203,8 +209,8 @@ class _Search:
     def _hopeless(self, term: NoiseTerm) -> bool:
         """Whether a term was far behind the best one of its triad alone: the other triad changes little of that."""
         alone = {next(iter(kinds)): found.score for kinds, found in self.seen.items() if len(kinds) == 1}
-        best = max((score for (triad, _, _), score in alone.items() if triad == term.triad), default=-np.inf)
-        return alone.get((term.triad, term.kind, term.tau), -np.inf) < best - _HOPELESS
+        best = max((score for (triad, *_), score in alone.items() if triad == term.triad), default=-np.inf)
+        return alone.get(term.identity, -np.inf) < best - _HOPELESS
 
     def sized(self, J: Floats, d: Floats, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
         """Best size of a term, and the log of its odds with the share of the sizes that the likelihood leaves."""
@@ -256,12 +262,17 @@ class _Search:
         return likelihood(self.information, self.cut, noise.terms) - self.information.fitted
 
 
+def _is_in(term: NoiseTerm, terms: Sequence[NoiseTerm]) -> bool:
+    """Whether a sensor of a term has noise of its kind already."""
+    return any(t.kind == term.kind and set(t.axes) & set(term.axes) for t in terms)
+
+
 def _of_triad(noise: NoiseModel, triad: str) -> tuple[NoiseTerm, ...]:
     return tuple(t for t in noise.terms if t.triad == triad)
 
 
-def _kinds(terms: Sequence[NoiseTerm]) -> frozenset[tuple[str, float]]:
-    return frozenset((t.kind, t.tau) for t in terms)
+def _kinds(terms: Sequence[NoiseTerm]) -> frozenset[Identity]:
+    return frozenset(t.identity for t in terms)
 
 
 def explored(

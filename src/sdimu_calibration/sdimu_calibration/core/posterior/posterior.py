@@ -16,7 +16,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
-from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
+from sdimu_calibration.core.noise_term import KINDS, Identity, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
@@ -143,7 +143,7 @@ class Posterior(Generic[E]):
     @property
     def tried(self) -> list[NoiseTerm]:
         """Kinds of noise that are probable, each once."""
-        kinds = {(t.triad, t.kind, t.tau): t for noise, p in self.noises if p > _SEEN for t in noise.terms}
+        kinds = {t.identity: t for noise, p in self.noises if p > _SEEN for t in noise.terms}
         return list(kinds.values())
 
     def starts(self) -> list[dict[str, tuple[int, bool]]]:
@@ -154,8 +154,8 @@ class Posterior(Generic[E]):
         list of dict of str to (int, bool)
             Of each the width of each member, and whether it was made between those of a scan; by label.
         """
-        likeliest: dict[frozenset[tuple[str, str, float]], Weighed] = {}
-        share: dict[frozenset[tuple[str, str, float]], float] = {}
+        likeliest: dict[frozenset[Identity], Weighed] = {}
+        share: dict[frozenset[Identity], float] = {}
         for model in self.models:
             likeliest.setdefault(model.noise.kinds, model)
             share[model.noise.kinds] = share.get(model.noise.kinds, 0.0) + model.probability

@@ -186,7 +186,10 @@ def _noise(found: Posterior[E], told: Sequence[NoiseTerm]) -> tuple[NoiseShare, 
     for noise, p in found.noises:
         for name in {f"{t.triad} {t.kind}" for t in noise.terms}:
             total[name] = min(total.get(name, 0.0) + p, 1.0)
-    interval = {f"{t.triad} {t.kind}": (t.low, t.high) for t in told}
+    interval: dict[str, tuple[float, float]] = {}
+    for t in told:
+        low, high = interval.get(name := f"{t.triad} {t.kind}", (t.low, t.high))
+        interval[name] = min(low, t.low), max(high, t.high)
     out = []
     for name, share in sorted(total.items(), key=lambda item: (-item[1], item[0])):
         if share < LEAST:

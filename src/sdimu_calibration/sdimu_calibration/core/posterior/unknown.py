@@ -9,15 +9,16 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.information import solved
+from sdimu_calibration.core.evidence.learned_noise import columns_of
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, AXES, FOLLOWS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
 
 
 @dataclass(frozen=True)
 class UnknownFunction:
-    """Error of the three sensors of a triad as a function of what it follows, in n stretches.
+    """Error of sensors of a triad as a function of what it follows, in n stretches.
 
     Attributes
     ----------
@@ -26,6 +27,8 @@ class UnknownFunction:
     variable : ndarray, shape (n, k)
         What it follows: mean direction of the specific force in b (1), body rate (rad/s), or temperature (K).
     turning : ndarray of bool, shape (n,)
+    axes : tuple of int
+        Sensors that have it; of the others mean and sigma are zero.
     mean, sigma : ndarray, shape (n, 3)
         Error of each axis and its sigma (SI); without its mean over the dwells, which is a bias, and of one of the
         attitude without what is linear in the force, which is in scale factors, misalignments and mass unbalances.
@@ -37,6 +40,7 @@ class UnknownFunction:
     turning: Bools
     mean: Floats
     sigma: Floats
+    axes: tuple[int, ...] = AXES
 
 
 def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[UnknownFunction, ...]:
@@ -62,7 +66,7 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
     spread = one.inverse + X @ covariance @ X.T
     share = cut.in_dwells[: len(cut)]
     out = []
-    for term, columns in zip(terms, _columns(terms, [cut.mode(t.kind, t.tau).shape[1] for t in terms]), strict=True):
+    for term, columns in zip(terms, columns_of(terms, cut), strict=True):
         if term.kind not in FOLLOWS:
             continue
         R = one.R[:, columns].reshape(cut.cells, 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
@@ -75,16 +79,5 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
         )
         variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
         x, mean = known.variable(term.kind), R @ mode[columns]
-        out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance)))
+        out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance), term.axes))
     return tuple(out)
-
-
-def _columns(terms: Sequence[NoiseTerm], modes: Sequence[int]) -> list[list[int]]:
-    """Columns of each term in the root of a noise: triad by triad, of a triad mode by mode, of a mode axis by axis."""
-    begin, out = 0, dict[int, list[int]]()
-    for triad in TRIADS:
-        for k, (term, count) in enumerate(zip(terms, modes, strict=True)):
-            if term.triad == triad:
-                out[k] = list(range(begin, begin + 3 * count))
-                begin += 3 * count
-    return [out[k] for k in range(len(terms))]
