@@ -18,6 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.posterior.neighbours import additions
 from sdimu_calibration.core.posterior.pairs import best_pair
 from sdimu_calibration.core.posterior.prior import KIN, WIDTH_SHARES, WIDTHS, Prior
 
@@ -138,21 +139,32 @@ class Expansion:
         """
         drops = self.drops()
         for k in range(len(self.members)):
-            a, v = self._inverse[k, k], self._V[:, k]
-            table = gains(self.c + v * v / a, self.r + v * (self._m[k] / a), self.data.prior.positive)
+            table = gains(*self._freed(k), self.data.prior.positive)
             yield k, table + (self.data.prior.log_more(self._without(k)) + drops[k])[:, None]
 
     def neighbours(self, least: float) -> Iterator[tuple[float, Members]]:
         """Give the models one move away whose log posterior exceeds `least`: what is added, dropped, exchanged."""
-        for column, width, gain in _above(self.gains(), least - self.score):
+        more = least - self.score
+        for column, width, gain in self._above(self.c, self.r, self.data.prior.log_more(self.columns), more):
             yield self.score + gain, _with(self.members, column, width)
-        for k, gain in enumerate(self.drops().tolist()):
-            if self.score + gain > least:
-                yield self.score + gain, self.members[:k] + self.members[k + 1 :]
-        for k, table in self.exchanges():
+        drops = self.drops()
+        for k, without in enumerate(drops.tolist()):
             others = self.members[:k] + self.members[k + 1 :]
-            for column, width, gain in _above(table, least - self.score):
-                yield self.score + gain, _with(others, column, width)
+            if without > more:
+                yield self.score + without, others
+            odds = self.data.prior.log_more(self._without(k))
+            for column, width, gain in self._above(*self._freed(k), odds, more - without):
+                yield self.score + without + gain, _with(others, column, width)
+
+    def _freed(self, place: int) -> tuple[Floats, Floats]:
+        """Information on each candidate, and its pull, beside the model without one of its members."""
+        a, v = self._inverse[place, place], self._V[:, place]
+        return self.c + v * v / a, self.r + v * (self._m[place] / a)
+
+    def _above(self, c: Floats, r: Floats, odds: Floats, least: float) -> Iterator[tuple[int, int, float]]:
+        """Candidates, widths and gains above a limit."""
+        found = additions(np.column_stack([c, r]), odds, self.data.prior.positive, _WIDTHS, least)
+        return zip(*(part.tolist() for part in found), strict=True)
 
     def merged(self) -> tuple[float, Members]:
         """Put the best candidate in the place of two members: log posterior of the model, and the model."""
@@ -216,12 +228,6 @@ def gains(c: Floats, r: Floats, positive: Bools) -> Floats:
     out = 0.5 * (r * r)[:, None] / a - 0.5 * np.log(a / _PRECISION) + _LOG_SHARE
     out[positive & (r < 0.0)] = -np.inf
     return np.asarray(out)
-
-
-def _above(table: Floats, least: float) -> Iterator[tuple[int, int, float]]:
-    """Entries of a table (q, widths) above a limit."""
-    for column, width in zip(*np.nonzero(table > least), strict=True):
-        yield int(column), int(width), float(table[column, width])
 
 
 def _with(members: Members, column: int, width: int) -> Members:

@@ -24,6 +24,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.effect import OF_ONE_TIME
 from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.posterior.neighbours import odds_beside
 
 MEAN_NUMBER = 2.0
 """Number of effects (1) that a model lacks, in the mean over sensors: real recordings showed between none and ten."""
@@ -84,6 +85,23 @@ class Prior:
         """Number of axes whose drifts are counted, and one for all that is no drift."""
         return int(self.drift.max(initial=-1)) + 2
 
+    @cached_property
+    def _alike(self) -> Ints:
+        """What `odds_beside` compares, shape (q, 4)."""
+        return np.ascontiguousarray(np.column_stack([self.parameter, self.twin, self.cause, self.drift]))
+
+    @cached_property
+    def _known_odds(self) -> dict[int, Floats]:
+        return {}
+
+    def _next_one(self, named: int) -> Floats:
+        """Log odds of each candidate as one more of a model with some effects that are no equations, shape (q,)."""
+        if named not in self._known_odds:
+            odds = self.log_share - np.log1p(1.0 / MEAN_NUMBER)
+            odds[~self.own] += np.log(named + 1.0)
+            self._known_odds[named] = odds
+        return self._known_odds[named]
+
     def named(self, base: Sequence[int]) -> int:
         """Count the candidates of a model that are no equations."""
         return int(np.count_nonzero(~self.own[np.asarray(base, dtype=np.int64)]))
@@ -101,21 +119,9 @@ class Prior:
         ndarray, shape (q,)
             Log (1); -inf for those that the model has already.
         """
-        out = self.log_share - np.log1p(1.0 / MEAN_NUMBER)
-        out[~self.own] += np.log(self.named(base) + 1.0)
-        if len(base):
-            at = np.asarray(base, dtype=np.int64)
-            present, taken, twin = np.zeros(len(out)), np.zeros(len(out), dtype=bool), np.zeros(len(out), dtype=bool)
-            present[self.cause[at]] = KIN
-            taken[self.parameter[at[~self.repeats[at]]]] = True
-            twin[self.twin[at]] = True
-            out = out + present[self.cause]
-            out[taken[self.parameter] | twin[self.twin]] = -np.inf
-            drifts = np.bincount(self.drift[at] + 1, minlength=self._bins)[1:]
-            if drifts.max(initial=0) >= MOST_DRIFTS:
-                out[np.isin(self.drift, np.flatnonzero(drifts >= MOST_DRIFTS))] = -np.inf
-            out[at] = -np.inf
-        return np.asarray(out)
+        at = np.asarray(base, dtype=np.int64)
+        next_one = self._next_one(self.named(base))
+        return odds_beside(next_one, self._alike, self.repeats, at, np.empty(len(next_one)), KIN, MOST_DRIFTS)
 
     def apart(self, base: Sequence[int], use: Ints) -> tuple[Ints, Ints]:
         """Say which pairs no model may hold: variants of one parameter, twins, more drifts of a bias than allowed.
