@@ -62,8 +62,8 @@ MUTANTS = (
     ),
     Mutant(
         "posterior/prior.py",
-        "np.log(self.named(base) + 1.0)",
-        "np.log(self.named(base) + 2.0)",
+        "np.log(named + 1.0)",
+        "np.log(named + 2.0)",
         (f"{TESTS}/posterior",),
     ),
     Mutant(

@@ -12,14 +12,13 @@ from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.learned_noise import (
     NoiseInformation,
     Wander,
-    columns_of,
     given_terms,
     learn,
     likelihood,
-    root_of,
     sizes_on_grid,
 )
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
+from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
 from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, RATE, TEMPERATURE, TRIADS, NoiseTerm
 
 STOPS = 12

@@ -22,10 +22,11 @@ from functools import cached_property
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
+from sdimu_calibration.core.evidence.noise_root import own_columns, root_of, times, triad_root
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
 from sdimu_calibration.core.side_by_side import side_by_side
@@ -385,7 +386,7 @@ def sizes_on_grid(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tupl
 def _modes(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Floats, Floats]:
     """Information on the modes of a term of unit size (m,), and their squared projections (m,)."""
     root = cut.mode(term.kind, term.tau)
-    own = _of_axes(term, root.shape[1])
+    own = own_columns(term, root.shape[1])
     values, vectors = np.linalg.eigh(_projected(J, root)[np.ix_(own, own)])
     y2 = (vectors.T @ (root.T @ d.reshape(cut.cells, 3)).ravel()[own]) ** 2
     return np.maximum(values, 0.0), y2
@@ -426,80 +427,14 @@ def given_terms(
     """
     blocks = {(a, b): information.block(a, b) for a in TRIADS for b in TRIADS}
     J, d = blocks[triad, triad], information.part(triad)
-    roots = {name: _triad_root(terms, cut, name) for name in TRIADS}
+    roots = {name: triad_root(terms, cut, name) for name in TRIADS}
     taken = [name for name in TRIADS if roots[name][0].shape[1]]
     if not taken:
         return J, d
-    B = np.hstack([_times(blocks[triad, name], *roots[name]) for name in taken])
-    M = np.block([[_times(_times(blocks[b, a], *roots[a]).T, *roots[b]).T for a in taken] for b in taken])
+    B = np.hstack([times(blocks[triad, name], *roots[name]) for name in taken])
+    M = np.block([[times(times(blocks[b, a], *roots[a]).T, *roots[b]).T for a in taken] for b in taken])
     parts = {name: (roots[name][0].T @ information.part(name).reshape(cut.cells, 3)).ravel() for name in taken}
     y = np.concatenate([parts[name][roots[name][1]] for name in taken])
     M[np.diag_indices_from(M)] += 1.0
     X = np.linalg.solve(M, np.column_stack([B.T, y]))
     return J - B @ X[:, :-1], d - B @ X[:, -1]
-
-
-def _times(J: Floats, root: Floats, own: Ints) -> Floats:
-    """``J (root x I3)``: columns of a matrix (m, 3 n) spread over the modes (n, r) of three sensors; (m, 3 r).
-
-    Of them only the `own` columns.
-    """
-    n, r = root.shape
-    every = np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1).reshape(-1, 3 * r)
-    return np.ascontiguousarray(every if len(own) == 3 * r else every[:, own])
-
-
-def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
-    """Square root R of the covariance of the mean errors, ``K = RR'``.
-
-    Returns
-    -------
-    ndarray, shape (6 n, r)
-        SI.
-    """
-    parts = []
-    for first, triad in zip((0, 3), TRIADS, strict=True):
-        root, own = _triad_root(terms, cut, triad)
-        every = np.zeros((cut.cells, 6, root.shape[1], 3))
-        for axis in range(3):
-            every[:, first + axis, :, axis] = root
-        parts.append(every.reshape(6 * cut.cells, -1)[:, own])
-    return np.hstack(parts)
-
-
-def columns_of(terms: Sequence[NoiseTerm], cut: Stretches) -> list[Ints]:
-    """Columns of `root_of` that belong to each term; a term of no size has none."""
-    begin, out = 0, dict[int, Ints]()
-    for triad in TRIADS:
-        for k, term in enumerate(terms):
-            if term.triad == triad:
-                size = len(term.axes) * cut.mode(term.kind, term.tau).shape[1] if term.size > 0.0 else 0
-                out[k] = np.arange(begin, begin + size)
-                begin += size
-    return [out[k] for k in range(len(terms))]
-
-
-def _triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> tuple[Floats, Ints]:
-    """Square root of the covariance of the terms of a triad.
-
-    Returns
-    -------
-    root : ndarray, shape (n, r)
-        Modes of the terms for a sensor that has all of them, of n cells.
-    own : ndarray of int, shape (k,)
-        Those of the 3 r columns, mode by axis, that a sensor has which a term is of.
-    """
-    of_triad = [t for t in terms if t.triad == triad and t.size > 0.0]
-    roots = [t.size * cut.mode(t.kind, t.tau) for t in of_triad]
-    if not roots:
-        return np.zeros((cut.cells, 0)), np.zeros(0, dtype=np.int64)
-    own, begin = [], 0
-    for term, root in zip(of_triad, roots, strict=True):
-        own.append(begin + _of_axes(term, root.shape[1]))
-        begin += 3 * root.shape[1]
-    return np.hstack(roots), np.concatenate(own)
-
-
-def _of_axes(term: NoiseTerm, modes: int) -> Ints:
-    """Columns of its sensors among three for each of its modes."""
-    return np.asarray((3 * np.arange(modes)[:, None] + np.array(term.axes)).ravel())

@@ -15,8 +15,9 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import of_the_sensor
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander, likelihood, root_of
+from sdimu_calibration.core.evidence.learned_noise import Wander, likelihood
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains

@@ -9,8 +9,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.information import solved
-from sdimu_calibration.core.evidence.learned_noise import columns_of
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.noise_root import columns_of
 from sdimu_calibration.core.noise_term import ATTITUDE, AXES, FOLLOWS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
