@@ -60,12 +60,7 @@ MUTANTS = (
         "            - 0.5 * (log_det + float(np.log(loading).sum()))",
         (f"{TESTS}/posterior",),
     ),
-    Mutant(
-        "posterior/prior.py",
-        "np.log(named + 1.0)",
-        "np.log(named + 2.0)",
-        (f"{TESTS}/posterior",),
-    ),
+    Mutant("posterior/prior.py", "np.log(named + 1.0)", "np.log(named + 2.0)", (f"{TESTS}/posterior",)),
     Mutant(
         "posterior/coefficients.py",
         "within + (weight[:, None] * apart).T @ apart",

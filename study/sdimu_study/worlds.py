@@ -192,12 +192,25 @@ def simulated_test(
         run = ByHand(RESTS, imu, site, seed=seed, effects=effects)
         recording, truth = by_hand_recording(run)
         return opened(recording, imu, site, "any"), felt(truth, site)
+    recording, sensor = simulated_recording(imu, plan, site, seed, effects, noise, rate_hz)
+    return opened(recording, imu, site), in_the_mean(sensor, recording, seed)
+
+
+def simulated_recording(
+    imu: ImuSpecification,
+    plan: str,
+    site: Site,
+    seed: int,
+    effects: tuple[str, ...],
+    noise: tuple[str, ...] = (),
+    rate_hz: float = _RATE_HZ,
+) -> tuple[Recording, ImuTruth]:
+    """Simulate the recording of a test on a table."""
     scenario = Scenario(
         study_plan(plan, seed), imu, site, study_table(plan), rate_hz=rate_hz, seed=seed, effects=effects, noise=noise
     )
     sensor = imu_truth(scenario)
-    recording = simulate(scenario, sensor)
-    return opened(recording, imu, site), in_the_mean(sensor, recording, seed)
+    return simulate(scenario, sensor), sensor
 
 
 def opened(recording: Recording, imu: ImuSpecification, site: Site, assumed: str = "") -> PreparedTest:

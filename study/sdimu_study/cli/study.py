@@ -235,6 +235,20 @@ def clean(
 
 
 @app.command()
+def disturbed(
+    out: Annotated[Path, typer.Option(help="Folder of runs and disturbed.json.")] = Path("out/study-disturbed"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each disturbance.")] = 10,
+    seed: Seed = 113_001,
+    workers: Workers = 2,
+) -> None:
+    """Diagnose tests on benches that are not ideal: site told wrong, table that vibrates, stamps that jitter."""
+    from sdimu_study.disturbed import CASES, STUDY
+
+    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
+    leave(out / "disturbed", results, STUDY.table(results, ("all",)))
+
+
+@app.command()
 def noise(
     out: Annotated[Path, typer.Option(help="Folder of runs, noise.json, noise.md.")] = Path("out/study-noise"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of noise.")] = 40,
