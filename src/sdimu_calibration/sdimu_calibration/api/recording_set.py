@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, SetFinding, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
+from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.unknown_section import followed
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -140,6 +142,15 @@ class JointDiagnosis:
     def found(self) -> tuple[SetFinding, ...]:
         """Effects that were found: `label`, `recording` (empty where all show it), `value`, `sigma` (SI), `alike`."""
         return self.core.findings
+
+    @property
+    def unknown(self) -> tuple[UnknownFunction, ...]:
+        """Function of the attitude that all recordings share and no effect explains: mean and sigma at all stops."""
+        return self.core.unknown
+
+    def plot_unknown(self) -> tuple[Any, ...]:
+        """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""
+        return tuple(followed(one).as_plotly() for one in self.unknown)
 
     @property
     def advice(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.traceability import recorded, traceability
-from sdimu_calibration.report.unknown_section import unknown_section
+from sdimu_calibration.report.unknown_section import unknown_of, unknown_section
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
@@ -118,6 +118,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
         coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
         odds_section(of_set.probabilities, "in these recordings", averaged=False) if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
+        unknown_section(of_set.unknown, draw) if of_set is not None else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, spell, draw)),
         rests_section(calibration.rests) if calibration.rests else "",
@@ -167,7 +168,7 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
         odds_section(diagnosis.probabilities, found=found),
-        unknown_section(diagnosis, draw),
+        unknown_section(unknown_of(diagnosis), draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),
         sections.smallest(candidates, summary.assumed),

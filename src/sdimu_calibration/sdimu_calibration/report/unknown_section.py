@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
@@ -21,9 +23,8 @@ _FOLLOWED = {
 """Title of an axis, its unit in SI, and what is drawn, by what the error follows."""
 
 
-def unknown_section(diagnosis: Diagnosis, draw: Draw) -> str:
+def unknown_section(found: Sequence[UnknownFunction], draw: Draw) -> str:
     """Return the section; empty where nothing unknown follows attitude, rate or temperature."""
-    found = unknown_of(diagnosis)
     if not found:
         return ""
     drawn = "; ".join(dict.fromkeys(_FOLLOWED[one.follows][2] for one in found))

@@ -13,6 +13,7 @@ from sdimu_calibration.core.joint.set_fit import SetFit, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.plan import backwards
 from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.units import to_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_sim.core.truth import in_body_frame
 
@@ -78,6 +79,7 @@ def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attit
     assert found.recurrence.answer == ()
     assert found.verdict == Verdict.UNEXPLAINED
     assert found.findings == ()
+    check_drawn(found)
     # Those of a search that knew no function would name what it took back.
     assert found.probabilities is None
     assert found.advice[0].kind == Kind.TRY_FORCE_EQUATION
@@ -96,3 +98,17 @@ def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attit
     told = np.sqrt(np.diag(found.after.covariance))[of_unit]
     again = np.sqrt(np.diag(alone))[[place[found.after.names[k]] for k in of_unit]]
     np.testing.assert_allclose(again, told, rtol=0.05)
+
+
+def check_drawn(found):
+    """The function at the stops is the hidden wave without what is constant or linear, within its band."""
+    one = next(one for one in found.unknown if one.triad == "accel")
+    assert 0 in one.axes
+    wave = to_si(40.0, "ug") * np.sin(one.variable @ [7.0, 4.0, 0.0])
+    columns = np.column_stack([np.ones(len(wave)), one.variable])
+    hidden = wave - columns @ np.linalg.lstsq(columns, wave, rcond=None)[0]
+    assert np.corrcoef(one.mean[:, 0], hidden)[0, 1] > 0.9
+    z = (one.mean[:, 0] - hidden) / one.sigma[:, 0]
+    # Some twenty attitudes: the root scatters by .16 about one.
+    assert np.sqrt(np.mean(z**2)) < 1.6
+    assert one.sigma[:, 0].max() < 0.5 * to_si(40.0, "ug")

@@ -11,16 +11,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.attitude_functions import covering
-from sdimu_calibration.core.joint.combine import Combination, Rows
+from sdimu_calibration.core.joint.combine import Combination, JointEstimate, Rows
 from sdimu_calibration.core.joint.leftovers import with_places
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_evidence import own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, columns_of, grouped_rows
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
+from sdimu_calibration.core.noise_term import ATTITUDE, AXES, TRIADS
+from sdimu_calibration.core.posterior.unknown import UnknownFunction, left_by_coefficients
+from sdimu_calibration.core.results import TurnOn
 
 _MOST = 150
 """Number of functions at most: several plans together cover more of the sphere than one."""
@@ -44,12 +48,15 @@ class Beside:
         None where there is none: then the estimate is that without.
     gain : float
         Log-likelihood that the function adds (1).
+    unknown : tuple of UnknownFunction
+        The function at all stops, one a triad.
     """
 
     fit: SetFit
     reports: tuple[Report, ...] = ()
     shared: SharedFunction | None = None
     gain: float = 0.0
+    unknown: tuple[UnknownFunction, ...] = ()
 
 
 def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
@@ -65,7 +72,8 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
     if any(r.estimator == HandheldFit.estimator for r in fit.reports):
         return Beside(fit)
     places = [r.places for r in with_places(fit, run) if r.places is not None]
-    functions = covering(np.vstack([p.up for p in places]), np.vstack([p.way for p in places]), _MOST)
+    stops = np.vstack([p.up for p in places])
+    functions = covering(stops, np.vstack([p.way for p in places]), _MOST)
     shared = SharedFunction(functions, tuple(c for c in CHANNELS if c in sensors), {})
     reports = asked_again(fit, run, noise=(), function=shared)
     for _ in range(_LEARNINGS):
@@ -73,7 +81,11 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
         reports = asked_again(fit, run, noise=(), function=shared)
     shared = replace(shared, size=_sizes(fit, reports, shared))
     gain = _likelihood(fit, reports, shared) - _likelihood(fit, reports, _tiny(fit, reports, shared))
-    return Beside(_estimated(fit, reports, shared), tuple(reports), shared, gain)
+    estimate, turn_on = _estimated(fit, reports, shared)
+    p = len(fit.names)
+    of_fit = replace(estimate, values=estimate.values[:p], covariance=estimate.covariance[:p, :p])
+    beside = replace(fit, estimate=of_fit, turn_on=turn_on, function=shared)
+    return Beside(beside, tuple(reports), shared, gain, _at_stops(estimate, shared, stops))
 
 
 def needless(beside: Beside, effects: Mapping[str, str], log_prior: Callable[[Sequence[str]], float]) -> list[str]:
@@ -183,10 +195,31 @@ def _likelihood(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) 
     return combined.log_likelihood(fit.tau) + float(np.log(combined.unit).sum() + 0.5 * np.log(known).sum())
 
 
-def _estimated(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> SetFit:
-    """Return the fit with estimate and scatter of the power-ons beside a function."""
-    combined, p = _combined(fit, reports, shared), len(fit.names)
+def _estimated(
+    fit: SetFit, reports: Sequence[Report], shared: SharedFunction
+) -> tuple[JointEstimate, tuple[TurnOn, ...]]:
+    """Estimate coefficients and weights, and the scatter of the power-ons beside them."""
+    combined = _combined(fit, reports, shared)
     turn_on = turn_on_scatter(combined) if combined.components else ()
-    found = in_scatter(combined, turn_on)
-    estimate = replace(found, values=found.values[:p], covariance=found.covariance[:p, :p])
-    return replace(fit, estimate=estimate, turn_on=turn_on, function=shared)
+    return in_scatter(combined, turn_on), turn_on
+
+
+def _at_stops(found: JointEstimate, shared: SharedFunction, force: Floats) -> tuple[UnknownFunction, ...]:
+    """Work out the function of each triad at all stops, from the weights at the end of an estimate.
+
+    `force` is the direction of the force at each stop in b, shape (n, 3) (1).
+    """
+    first = len(found.values) - len(shared.labels)
+    weights, covariance = found.values[first:], found.covariance[first:, first:]
+    values = left_by_coefficients(np.full(len(force), 1.0 / len(force)), force) @ shared.functions.at(force)
+    out = []
+    for triad in TRIADS:
+        axes = tuple(axis for axis in AXES if f"{triad}_{'xyz'[axis]}" in shared.sensors)
+        mean, sigma = np.zeros((len(force), 3)), np.zeros((len(force), 3))
+        for axis in axes:
+            own = np.flatnonzero(shared.of(f"{triad}_{'xyz'[axis]}"))
+            mean[:, axis] = values @ weights[own]
+            sigma[:, axis] = np.sqrt(np.einsum("nk,kl,nl->n", values, covariance[np.ix_(own, own)], values))
+        if axes:
+            out.append(UnknownFunction(triad, ATTITUDE, force, np.zeros(len(force), bool), mean, sigma, axes))
+    return tuple(out)

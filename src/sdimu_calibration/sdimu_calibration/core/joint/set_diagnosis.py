@@ -29,6 +29,7 @@ from sdimu_calibration.core.joint.set_standing import next_recording, standing_b
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
+from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -108,6 +109,8 @@ class SetDiagnosis:
     error_without : float or None
         Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
         them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
+    unknown : tuple of UnknownFunction
+        The function of the attitude that explains what is left, at all stops; empty without one.
     """
 
     verdict: Verdict
@@ -123,6 +126,7 @@ class SetDiagnosis:
     refused: tuple[SetFinding, ...] = ()
     error_without: float | None = None
     probabilities: Probabilities | None = None
+    unknown: tuple[UnknownFunction, ...] = ()
 
 
 def diagnose_set(
@@ -156,10 +160,8 @@ def diagnose_set(
     asked = again is not None and (not again.answer or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
-        found, needed_not = _beside_function(found, beside, again, options, run)
-        refused += tuple(
-            f for f in findings if (tagged(f.label, f.recording) if f.recording else f.label) in needed_not
-        )
+        found, beside, needed_not = _beside_function(found, beside, again, options, run)
+        refused += tuple(f for f in findings if f.tag in needed_not)
         why = f"{why} {_explained(again.sensors, needed_not)}".strip()
         after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
     test = base_fit(found.after).test
@@ -181,12 +183,13 @@ def diagnose_set(
         refused,
         without,
         None if beside_function else probabilities(found.posterior),
+        beside.unknown if beside_function else (),
     )
 
 
 def _beside_function(
     found: SetSearch, beside: Beside, again: Recurrence, options: SetOptions, run: Run
-) -> tuple[SetSearch, list[str]]:
+) -> tuple[SetSearch, Beside, list[str]]:
     """Estimate what was found beside a function of the attitude, without the effects that it explains; their labels.
 
     An effect that imitates an unknown function was found as nothing else was there to take it up.
@@ -199,7 +202,7 @@ def _beside_function(
     if labels:
         found = taken_back(found, options, run, labels)
         beside = with_function(found.after, again.sensors, run)
-    return replace(found, after=beside.fit, standing=standing_beside(beside.fit, found.chosen)), labels
+    return replace(found, after=beside.fit, standing=standing_beside(beside.fit, found.chosen)), beside, labels
 
 
 def _explained(sensors: Sequence[str], labels: Sequence[str]) -> str:

@@ -71,13 +71,28 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
             continue
         R = one.R[:, columns].reshape(cut.cells, 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
         R = np.einsum("sn,ncr->scr", cut.at_stretches(term.kind), R)
-        taken = np.ones((len(cut), 1))
-        if term.kind == ATTITUDE:
-            taken = np.column_stack([taken, known.force])
-        R = R - np.einsum(
-            "st,tcr->scr", taken @ np.linalg.pinv(taken.T @ (share[:, None] * taken)) @ (taken.T * share), R
-        )
+        R = np.einsum("st,tcr->scr", left_by_coefficients(share, known.force if term.kind == ATTITUDE else None), R)
         variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
         x, mean = known.variable(term.kind), R @ mode[columns]
         out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance), term.axes))
     return tuple(out)
+
+
+def left_by_coefficients(share: Floats, force: Floats | None = None) -> Floats:
+    """Take out of an error what coefficients take up: its mean, and what is linear in the force.
+
+    Parameters
+    ----------
+    share : ndarray, shape (n,)
+        Weight of each stretch in these means (1).
+    force : ndarray, shape (n, 3), optional
+        Mean direction of the specific force in b (1); nothing linear is taken out without.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        Errors in all stretches to what is left of them (1).
+    """
+    taken = np.ones((len(share), 1)) if force is None else np.column_stack([np.ones(len(share)), force])
+    fitted = np.linalg.pinv(taken.T @ (share[:, None] * taken)) @ (taken.T * share)
+    return np.asarray(np.eye(len(share)) - taken @ fitted)
