@@ -23,8 +23,6 @@ POWERS = ("temperature", "temperature_squared", "temperature_cubed")
 """Powers of the temperature, as they stand in the names of effects."""
 SEEN_OF_TURNS = tuple(f"gyro_bias_temperature_rate{power}" for power in ("", "_linear", "_quadratic"))
 """Effects by which gyros see axes that turn with each of `POWERS`."""
-RATES = ("temperature_rate", "temperature_rate_linear")
-"""Rates of the first powers of the temperature, as they stand in the names of effects."""
 _SPAN_K = np.linspace(-50.0, 50.0, 11)
 """Temperatures about T0 (K) at which the turned sensor is read: the range in which an IMU is used."""
 _STEP_K = 0.01
@@ -53,35 +51,6 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
     out = in_body_frame(truth.coefficients, frame) | sizes
     if frame != "prior" and any(name.startswith("accel_misalignment_temperature") for name in sizes):
         out |= _turned(truth.coefficients, sizes)
-    return out
-
-
-def with_lag(truth: ImuTruth, frame: str, lag_s: float) -> dict[str, float]:
-    """State sensors that lag behind their thermometer by what a calibration without a lag finds.
-
-    To first order of the lag L, ``k1 (T - L dT/dt - T0) + k2 (T - L dT/dt - T0)^2`` is the polynomial and rate terms
-    ``-k1 L dT/dt`` and ``-2 k2 L (T - T0) dT/dt``. The frame is that of accelerometers without the lag, so rate terms
-    of axes are those as built.
-
-    Parameters
-    ----------
-    frame : str
-        ``prior`` or ``accelerometer_triad``.
-    lag_s : float
-        s.
-
-    Returns
-    -------
-    dict of str to float
-        As `true_coefficients` (SI).
-    """
-    out = true_coefficients(truth, frame)
-    for name, size in parse_effects(truth.effects).sizes.items():
-        stem, _, part = name.rpartition("_")
-        for times, (power, rate) in enumerate(zip(POWERS, RATES, strict=False), start=1):
-            if stem.endswith(f"_{power}"):
-                late = f"{stem.removesuffix(power)}{rate}_{part}"
-                out[late] = out.get(late, 0.0) - times * lag_s * size
     return out
 
 
