@@ -15,7 +15,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.site_reference import relative_line
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import table
-from sdimu_calibration.report.drawing import AFTER, BAND, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, Figure, lay_out
 from sdimu_calibration.report.effect_words import effect_of_key, tip, title_of
 from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
@@ -133,7 +133,7 @@ def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) ->
     size = np.array([prior[name] for name in names])
     sigma: Floats = np.sqrt(np.diag(calibration.covariance))[shown] / size
     figure = Figure()
-    figure.shape("rect", x0=-1.0, x1=1.0, fillcolor=BAND, line={"width": 0}, layer="below")
+    figure.shade(x0=-1.0, x1=1.0)
     figure.add(
         "scatter",
         x=calibration.values[shown] / size,
