@@ -35,18 +35,12 @@ class Diagnosing:
         Effects beyond the model that the test begins with.
     warn : callable
         Tells the user that there will be no more diagnoses, and why.
-
-    Attributes
-    ----------
-    last : Answer or None
-        The newest diagnosis, with the answer to the question of the job.
     """
 
     def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:
         self._node, self._warn = node, warn
         self._stops = StopDiagnosis(Worker(job), added) if job else None
         self._report = job.report if job else None
-        self.last: Answer | None = None
         # Few and telling: who comes late gets them all.
         self._diagnosis = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
         self._ranking = node.create_publisher(JointState, "calibration/ranking", HISTORY)
@@ -98,7 +92,6 @@ class Diagnosing:
             return
         stamp_ns = newest_ns if answer.request.until_ns is None else answer.request.until_ns
         if isinstance(answer, Answer):
-            self.last = answer
             self._publish(answer, stamp_ns)
         elif answer.png:
             publish(self._picture, messages.picture(stamp_ns, answer.png))

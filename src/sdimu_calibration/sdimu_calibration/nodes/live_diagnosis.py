@@ -8,7 +8,6 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
-from typing import Any
 
 from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
@@ -79,11 +78,6 @@ class Worker:
 class StopDiagnosis:
     """Asks at the end of each stop, and again when the model has changed.
 
-    Attributes
-    ----------
-    about : object
-        For `Job.question`, as it stands when a stop ends.
-
     Parameters
     ----------
     added : tuple of str
@@ -95,7 +89,6 @@ class StopDiagnosis:
         self._models = [added]
         self._stop, self._rest_ns = 0, 0
         self._last: tuple[int, int | None] | None = None
-        self.about: Any = None
 
     @property
     def idle(self) -> bool:
@@ -128,7 +121,7 @@ class StopDiagnosis:
 
     def _ask(self, stop: int, until_ns: int | None, report: bool = False) -> None:
         self._last = stop, until_ns
-        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), self.about, report))
+        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), report=report))
 
     def answer(self) -> Answer | Picture | None:
         """Return a diagnosis once it is there, then its picture; raises as `Worker.answer`."""
