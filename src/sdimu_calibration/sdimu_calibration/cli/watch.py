@@ -17,6 +17,7 @@ from sdimu_calibration.report.progress_text import Falling, falling, light, shor
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.text import Text
 
 
 class Watch:
@@ -114,10 +115,6 @@ def _gauge(f: Falling) -> str:
     full = round(_GAUGE * left)
     return "\N{FULL BLOCK}" * full + "\N{LIGHT SHADE}" * (_GAUGE - full)
 
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.text import Text
 
 _NOTABLE = 3.0
 """Sigmas from which a cell has a number."""
