@@ -27,14 +27,8 @@ from sdimu_calibration.report.live_text import diagnosis_line
 class Diagnosing:
     """Diagnoses a running test.
 
-    Parameters
-    ----------
-    job : Job or None
-        None where nothing is to be diagnosed.
-    added : tuple of str
-        Effects beyond the model that the test begins with.
-    warn : callable
-        Tells the user that there will be no more diagnoses, and why.
+    `job`: None where nothing is to be diagnosed. `added`: effects beyond the model that the test begins with. `warn`:
+    tells the user that there will be no more diagnoses, and why.
     """
 
     def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:

@@ -37,12 +37,8 @@ class Feed:
     Stamps stay as the messages have them (ns). Samples enter the filter by whole seconds after the origin, so that the
     counts and estimates published for a second do not depend on how messages arrived.
 
-    Parameters
-    ----------
-    make : callable
-        Makes a `LiveCalibration`.
-    journal : Journal, optional
-        Where everything is written, instead of memory; what is in it already comes first.
+    `make`: makes a `LiveCalibration`. `journal`: where everything is written, instead of memory; what is in it already
+    comes first.
     """
 
     def __init__(self, make: Callable[[], LiveCalibration], journal: Journal | None = None) -> None:

@@ -78,10 +78,7 @@ class Worker:
 class StopDiagnosis:
     """Asks at the end of each stop, and again when the model has changed.
 
-    Parameters
-    ----------
-    added : tuple of str
-        Effects beyond the model that the test begins with.
+    `added`: effects beyond the model that the test begins with.
     """
 
     def __init__(self, worker: Worker, added: tuple[str, ...]) -> None:

@@ -66,12 +66,8 @@ class Outcome(Enum):
 class MoveProgress:
     """Follows one move.
 
-    Parameters
-    ----------
-    seen : Seen
-        The joint states before it was sent.
-    tolerance_rad, rest_rad_s : float
-        What counts as being there and as rest (rad, rad/s).
+    `seen`: the joint states before it was sent. `tolerance_rad`, `rest_rad_s`: what counts as being there and as rest
+    (rad, rad/s).
     """
 
     def __init__(self, goal: str, move: Move, seen: Seen, tolerance_rad: float, rest_rad_s: float) -> None:

@@ -18,10 +18,7 @@ TIME, STOP = "time (s)", "stop"
 def axes(diagnosis: Diagnosis) -> Mapping[str, Floats]:
     """Give every variable at every epoch.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a fit that navigates.
+    `diagnosis`: of a fit that navigates.
 
     Returns
     -------

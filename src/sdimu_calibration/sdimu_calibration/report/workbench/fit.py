@@ -124,12 +124,7 @@ class Missing:
 class Preview:
     """A candidate before it is added, by the linear model.
 
-    Attributes
-    ----------
-    effect : Effect
-        The first, where a text gives several.
-    residuals : Residuals
-        `before` and `after` it is added.
+    `effect`: the first, where a text gives several. `residuals`: `before` and `after` it is added.
     """
 
     effect: Effect

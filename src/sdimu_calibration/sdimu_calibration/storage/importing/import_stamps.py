@@ -33,12 +33,7 @@ _LARGEST_NS = 4e18
 def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: int) -> tuple[Stamps, tuple[str, ...]]:
     """Read the stamps of a table.
 
-    Parameters
-    ----------
-    column : int or str or None
-        None makes them from the rate.
-    samples : int
-        How many there must be.
+    `column`: None makes them from the rate. `samples`: how many there must be.
 
     Returns
     -------
