@@ -61,7 +61,7 @@ def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> di
             out |= {_named(name, power): value for name, value in elements(triad, part + np.eye(3)).items()}
         part = _power_of(unbalance @ R.transpose(0, 2, 1), order)
         out |= {_named(name, power): value for name, value in unbalance_elements(part).items()}
-    ahead, behind = (_frames(coefficients, sizes, _SPAN_K + step) for step in (_STEP_K, -_STEP_K))
+    ahead, behind = (accelerometer_frames(coefficients, sizes, _SPAN_K + step) for step in (_STEP_K, -_STEP_K))
     turn = [rotation_vector(one @ other.T) / (2.0 * _STEP_K) for one, other in zip(behind, ahead, strict=True)]
     seen = np.einsum("kij,klj,kl->ki", axes["gyro"], R, np.array(turn))
     for order, effect in enumerate(SEEN_OF_TURNS):
@@ -71,8 +71,8 @@ def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> di
     return out
 
 
-def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
-    """Turn from the body frame in which a sensor was built to that of its accelerometers at every temperature.
+def accelerometer_frames(coefficients: Mapping[str, float], sizes: Mapping[str, float], above_k: Floats) -> Floats:
+    """Turn from the body frame in which a sensor was built to that of its accelerometers: R in v_triad = R v_b.
 
     Parameters
     ----------
@@ -82,12 +82,7 @@ def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
     Returns
     -------
     ndarray, shape (k, 3, 3)
-        R in v_triad = R v_b.
     """
-    return _frames(truth.coefficients, parse_effects(truth.effects).sizes, above_k)
-
-
-def _frames(coefficients: Mapping[str, float], sizes: Mapping[str, float], above_k: Floats) -> Floats:
     axes = _at(input_axes("accel", coefficients), "accel", sizes, above_k)
     return np.array([triad_rotation(M) for M in axes])
 
