@@ -31,12 +31,8 @@ too tight misleads, one that is too wide costs little."""
 class Source:
     """What the user says of a recording; everything left out is recognised.
 
-    Attributes
-    ----------
-    accel_unit, gyro_unit : str or None
-        Such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``.
-    accel_sign, gyro_sign : int or None
-        -1 when the negative of the specific force, or of the rate, was recorded.
+    `accel_unit`, `gyro_unit`: such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``. `accel_sign`,
+    `gyro_sign`: -1 when the negative of the specific force, or of the rate, was recorded.
     """
 
     topics: TopicChoice = field(default_factory=TopicChoice)
