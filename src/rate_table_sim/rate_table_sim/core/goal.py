@@ -67,7 +67,12 @@ class GoalPoint:
 class Goal:
     """A trajectory, its joints in the order of the table's axes.
 
-    `name`: to answer with. `start_s`: time of the table at which it starts; None is now.
+    Attributes
+    ----------
+    name : str
+        To answer with.
+    start_s : float or None
+        Time of the table at which it starts; None is now.
     """
 
     name: str
@@ -80,8 +85,16 @@ def goal_samples(
 ) -> tuple[Floats, Floats]:
     """Motion of the axes through the points of a goal.
 
-    `points`: times count from the state `at`. `limits`: one an axis; every sample of the motion keeps them. `names`: of
-    the joints, for messages. `grid_hz`: samples a second.
+    Parameters
+    ----------
+    points : sequence of GoalPoint
+        Times count from the state `at`.
+    limits : sequence of AxisLimits
+        One an axis; every sample of the motion keeps them.
+    names : sequence of str
+        Of the joints, for messages.
+    grid_hz : float
+        Samples a second.
 
     Returns
     -------

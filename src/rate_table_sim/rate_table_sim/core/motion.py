@@ -51,7 +51,13 @@ class TableMotion:
 
 
 def table_motion(plan: Plan, table: TableSpecification, seed: int = 0) -> TableMotion:
-    """Carry out a plan. `seed`: of the encoder noise; nothing else is random."""
+    """Carry out a plan.
+
+    Parameters
+    ----------
+    seed : int
+        Of the encoder noise; nothing else is random.
+    """
     if table.axes is None:
         columns = tuple((AXES.index(turn.axis), 1.0) for turn in plan.turns)
     else:
@@ -86,7 +92,10 @@ def phase_changes(motion: TableMotion) -> tuple[Floats, Bools, Ints]:
 def reported_samples(motion: TableMotion, before: TableMotion | None = None) -> Ints:
     """Find the samples at which phase and stop are reported: at every change and once a second.
 
-    `before`: the stretch before this one; its last sample was reported, or held what was.
+    Parameters
+    ----------
+    before : TableMotion, optional
+        The stretch before this one; its last sample was reported, or held what was.
 
     Returns
     -------

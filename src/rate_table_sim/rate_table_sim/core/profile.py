@@ -19,8 +19,14 @@ _ON_GRID = 1e-6
 class Trapezoid:
     """Rate up, constant, down; every breakpoint is a sample.
 
-    `samples`, `ramp_samples`: length of the turn and of each ramp, in sample intervals. `step_s`: sample interval.
-    `angle_rad`: signed.
+    Attributes
+    ----------
+    samples, ramp_samples : int
+        Length of the turn and of each ramp, in sample intervals.
+    step_s : float
+        Sample interval.
+    angle_rad : float
+        Signed.
     """
 
     samples: int
@@ -58,7 +64,12 @@ def trapezoid(turn: Turn, acceleration_rad_s2: float, sample_rate_hz: float, num
     ``A = w_p (T - t_r)``, ``w_p = a t_r``: the smaller root t_r, then rounded up to the grid, which lowers the
     acceleration and keeps T.
 
-    `acceleration_rad_s2`: limit. `number`: of the turn in the plan, from 1, for the error message.
+    Parameters
+    ----------
+    acceleration_rad_s2 : float
+        Limit.
+    number : int
+        Of the turn in the plan, from 1, for the error message.
     """
     size = abs(turn.angle_rad)
     samples = round(size / turn.rate_rad_s * sample_rate_hz)

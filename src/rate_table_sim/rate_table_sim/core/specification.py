@@ -43,10 +43,17 @@ class Imperfections:
 class TableSpecification:
     """A rate table.
 
-    `axes`: IMU axis letters about which outer, middle and inner axis turn when all angles are zero; None is a table
-    that turns about any body axis. `sample_rate_hz`: rate of the motion samples and grid of all profile breakpoints.
-    `limits`: what goals may ask of each axis; a plan states its own acceleration. `joints`: names of the three joints
-    in messages; None for those of the axes.
+    Attributes
+    ----------
+    axes : tuple of str or None
+        IMU axis letters about which outer, middle and inner axis turn when all angles are zero;
+        None is a table that turns about any body axis.
+    sample_rate_hz : float
+        Rate of the motion samples and grid of all profile breakpoints.
+    limits : tuple of AxisLimits
+        What goals may ask of each axis; a plan states its own acceleration.
+    joints : tuple of str
+        Names of the three joints in messages; None for those of the axes.
     """
 
     name: str = "ideal"

@@ -81,7 +81,12 @@ _LEVELS = {"refused": DiagnosticStatus.WARN, "stopped": DiagnosticStatus.WARN, "
 class GoalServer:
     """Takes trajectories and the services hold, resume, stop and finish.
 
-    `start_ns`: stamp at which the table's time begins. `allow_partial`: take trajectories that leave joints out.
+    Parameters
+    ----------
+    start_ns : int
+        Stamp at which the table's time begins.
+    allow_partial : bool
+        Take trajectories that leave joints out.
     """
 
     def __init__(

@@ -39,7 +39,13 @@ FAREWELL_S = 20.0
 
 
 class Pace:
-    """Times real time, counted from the first question after a restart. `speed`: times real time; 0 sets no pace."""
+    """Times real time, counted from the first question after a restart.
+
+    Parameters
+    ----------
+    speed : float
+        Times real time; 0 sets no pace.
+    """
 
     def __init__(self, speed: float) -> None:
         self._speed = speed

@@ -106,7 +106,15 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
 
 @dataclass(frozen=True)
 class Findings:
-    """What a diagnosis leaves, and where. `title`: of the page. `null`: of a bootstrap."""
+    """What a diagnosis leaves, and where.
+
+    Attributes
+    ----------
+    title : str
+        Of the page.
+    null : Null or None
+        Of a bootstrap.
+    """
 
     about: Asked
     title: str

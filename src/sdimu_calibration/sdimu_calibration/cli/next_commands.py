@@ -33,7 +33,12 @@ _FIRST = ("site", "imu", "model", "noise", "estimator")
 class Asked:
     """What a verb was asked for, so far as the next one has to repeat it.
 
-    `options`: as words of a command. `place`: site and IMU alone, likewise.
+    Attributes
+    ----------
+    options : sequence of str
+        As words of a command.
+    place : sequence of str
+        Site and IMU alone, likewise.
     """
 
     bags: Sequence[Path]

@@ -38,8 +38,14 @@ def own_domain(log: Path, domain: int | None = None, about: RunningTest | None =
 
     Traffic stays on the loopback interface. The domain is held by a lock file until the end.
 
-    `log`: folder of the nodes' logs. `domain`: the domain; left out, it is that of ``ROS_DOMAIN_ID``, and without it
-    one that is free. `about`: what is run there, for those that watch it.
+    Parameters
+    ----------
+    log : Path
+        Folder of the nodes' logs.
+    domain : int, optional
+        The domain; left out, it is that of ``ROS_DOMAIN_ID``, and without it one that is free.
+    about : RunningTest, optional
+        What is run there, for those that watch it.
 
     Yields
     ------
@@ -76,8 +82,16 @@ def enter_domain(domain: int) -> None:
 class RunningTest:
     """A test that a run of `sdimu` on this machine makes, as it tells those that watch it.
 
-    `folder`: of its results. `duration_s`: 0 where nobody knows. `stops`: 0 where nobody knows. `start_ns`: stamp of
-    its begin.
+    Attributes
+    ----------
+    folder : str
+        Of its results.
+    duration_s : float
+        0 where nobody knows.
+    stops : int
+        0 where nobody knows.
+    start_ns : int
+        Stamp of its begin.
     """
 
     folder: str
@@ -194,7 +208,10 @@ class _Child:
 class Children:
     """A set of nodes, each a process; leaving the context ends them all.
 
-    `log`: folder of their output, ``<name>.log``, and parameters, ``<name>.yaml``.
+    Parameters
+    ----------
+    log : Path
+        Folder of their output, ``<name>.log``, and parameters, ``<name>.yaml``.
     """
 
     def __init__(self, log: Path) -> None:
@@ -211,7 +228,12 @@ class Children:
     def start(self, name: str, module: str, parameters: Mapping[str, Any]) -> None:
         """Start a node.
 
-        `module`: Python module to run. `parameters`: ROS parameters; empty lists are left out, ROS cannot type them.
+        Parameters
+        ----------
+        module : str
+            Python module to run.
+        parameters : mapping of str to value
+            ROS parameters; empty lists are left out, ROS cannot type them.
         """
         given = {key: value for key, value in parameters.items() if value != []}
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.

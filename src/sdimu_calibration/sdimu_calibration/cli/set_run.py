@@ -36,7 +36,12 @@ if TYPE_CHECKING:
 class SetRequest:
     """What the user asks of a set.
 
-    `bags`: None where a set file names them. `opening`: of all recordings; what a set file says of one comes first.
+    Attributes
+    ----------
+    bags : sequence of Path
+        None where a set file names them.
+    opening : StatedOpening
+        Of all recordings; what a set file says of one comes first.
     """
 
     bags: Sequence[Path]
@@ -52,7 +57,10 @@ class SetRequest:
 def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     """Return the only bag; None where several are to be fitted together.
 
-    Raises BadParameter when there is no bag, or bags stand beside a set file.
+    Raises
+    ------
+    BadParameter
+        When there is no bag, or bags stand beside a set file.
     """
     if file is not None and bags:
         raise typer.BadParameter("the file names the bags of its set: leave the bags out", param_hint="--set")
@@ -64,7 +72,10 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
 def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
     """Refuse options that are of one recording: those of an opening, and others by name.
 
-    Raises BadParameter when one of them is stated.
+    Raises
+    ------
+    BadParameter
+        When one of them is stated.
     """
     own = {name: getattr(opening, name) for name in ("whole_turns", "rests", "exclude_stops", "exclude_times")}
     for name, value in (options | own).items():

@@ -99,7 +99,12 @@ def bench_of_set(
 ) -> tuple[Mapping[str, Callable[[], PreparedTest]], Model, Judge]:
     """Read a set for the workbench: each of its recordings by itself, and what judges them together.
 
-    `file`: set file, in the place of bags. `model`: as the option of the same name.
+    Parameters
+    ----------
+    file : Path or None
+        Set file, in the place of bags.
+    model : str or None
+        As the option of the same name.
 
     Returns
     -------

@@ -74,9 +74,16 @@ class _Peer:
 class Producer:
     """Send one topic and stay at most a window ahead of every consumer that grants credits.
 
-    `message_type`: ROS message class of the topic. `window_ns`: how far (ns of stamps) the producer may be ahead;
-    `NO_LIMIT` only does the end of stream. `on_credit`: called after each credit: time to send more. `patience_s`: a
-    consumer that vanished is waited for so long: it may be started again and go on.
+    Parameters
+    ----------
+    message_type : type
+        ROS message class of the topic.
+    window_ns : int
+        How far (ns of stamps) the producer may be ahead; `NO_LIMIT` only does the end of stream.
+    on_credit : callable or None
+        Called after each credit: time to send more.
+    patience_s : float
+        A consumer that vanished is waited for so long: it may be started again and go on.
     """
 
     def __init__(
@@ -191,10 +198,17 @@ def publish(publisher: Any, message: Any) -> None:
 class Consumer:
     """Grant credits for one topic and watch for its end.
 
-    `topic`: the data topic; the data subscription itself belongs to the caller. `every`: samples between credits.
-    `busy`: True while samples are waiting inside the consumer; credits are then not repeated. `on_end`: called when
-    everything up to the end of a stream has been reached, once for each end; when some of it did not come in time
-    (`QUIET_REPEATS`), once without it, and again if it comes after all.
+    Parameters
+    ----------
+    topic : str
+        The data topic; the data subscription itself belongs to the caller.
+    every : int
+        Samples between credits.
+    busy : callable
+        True while samples are waiting inside the consumer; credits are then not repeated.
+    on_end : callable or None
+        Called when everything up to the end of a stream has been reached, once for each end; when some of it did not
+        come in time (`QUIET_REPEATS`), once without it, and again if it comes after all.
     """
 
     def __init__(

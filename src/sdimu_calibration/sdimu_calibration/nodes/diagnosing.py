@@ -27,8 +27,14 @@ from sdimu_calibration.report.live_text import diagnosis_line
 class Diagnosing:
     """Diagnoses a running test: at the end of each stop, and again when the model has changed.
 
-    `job`: None where nothing is to be diagnosed. `added`: effects beyond the model that the test begins with. `warn`:
-    tells the user that there will be no more diagnoses, and why.
+    Parameters
+    ----------
+    job : Job or None
+        None where nothing is to be diagnosed.
+    added : tuple of str
+        Effects beyond the model that the test begins with.
+    warn : callable
+        Tells the user that there will be no more diagnoses, and why.
     """
 
     def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:

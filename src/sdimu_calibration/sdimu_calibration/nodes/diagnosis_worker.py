@@ -90,9 +90,16 @@ class WorkerRequest:
 class Answer:
     """What came of a request.
 
-    `more`: answer to the question; None without question or fit. `seconds`: from the request to the answer.
-    `reached_ns`: stamp of the last sample that was looked at (ns); 0 where there was none. `unreported`: why the files
-    of `Job.report` are not there; empty where they are, or none are wanted.
+    Attributes
+    ----------
+    more : object
+        Answer to the question; None without question or fit.
+    seconds : float
+        From the request to the answer.
+    reached_ns : int
+        Stamp of the last sample that was looked at (ns); 0 where there was none.
+    unreported : str
+        Why the files of `Job.report` are not there; empty where they are, or none are wanted.
     """
 
     request: WorkerRequest
@@ -105,7 +112,13 @@ class Answer:
 
 @dataclass(frozen=True)
 class Picture:
-    """What comes after each answer. `png`: of the diagnosis; empty where it waits."""
+    """What comes after each answer.
+
+    Attributes
+    ----------
+    png : bytes
+        Of the diagnosis; empty where it waits.
+    """
 
     request: WorkerRequest
     png: bytes
@@ -176,8 +189,11 @@ class Diagnoser:
 def work(pipe: Connection) -> None:
     """Answer requests until the pipe breaks.
 
-    `pipe`: brings a `Job`, then each `WorkerRequest`; takes each `Answer`, and where the job wants it a `Picture`,
-    which need not be waited for.
+    Parameters
+    ----------
+    pipe : Connection
+        Brings a `Job`, then each `WorkerRequest`; takes each `Answer`, and where the job wants it a `Picture`,
+        which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -25,8 +25,6 @@ consumers, which compile for minutes where they have never run."""
 class Driving:
     """Drives a table from its first joint states to the end of a test.
 
-    `done`: of the node.
-
     Parameters
     ----------
     node : rclpy.node.Node
@@ -34,6 +32,11 @@ class Driving:
     act : function of ndarray, shape (3,)
         Called again and again while no move is under way, with the angles of the joints (rad): it moves the table by
         `driver`, or calls `end` or `fail`.
+
+    Attributes
+    ----------
+    done : Future
+        Of the node.
     """
 
     def __init__(self, node: Node, act: Callable[[Floats], None]) -> None:

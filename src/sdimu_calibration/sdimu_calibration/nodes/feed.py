@@ -37,8 +37,12 @@ class Feed:
     Stamps stay as the messages have them (ns). Samples enter the filter by whole seconds after the origin, so that the
     counts and estimates published for a second do not depend on how messages arrived.
 
-    `make`: makes a `LiveCalibration`. `journal`: where everything is written, instead of memory; what is in it already
-    comes first.
+    Parameters
+    ----------
+    make : callable
+        Makes a `LiveCalibration`.
+    journal : Journal, optional
+        Where everything is written, instead of memory; what is in it already comes first.
     """
 
     def __init__(self, make: Callable[[], LiveCalibration], journal: Journal | None = None) -> None:

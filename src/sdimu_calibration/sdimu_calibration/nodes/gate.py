@@ -18,8 +18,12 @@ GREETING_S = 2.0
 class Companion:
     """A topic that goes with the IMU: status or temperature.
 
-    `latest_ns`: newest stamp of its messages, but for those of no time of the test. `heard`: wall time at which that
-    came.
+    Attributes
+    ----------
+    latest_ns : int or None
+        Newest stamp of its messages, but for those of no time of the test.
+    heard : float or None
+        Wall time at which that came.
     """
 
     latest_ns: int | None = None
@@ -36,8 +40,14 @@ class Companion:
     def allows(self, first_ns: int, imu_ns: int, published: bool, now: float, born: float) -> tuple[int, bool]:
         """Stamp up to which this topic lets the IMU be processed, and whether the topic is known up to there.
 
-        `first_ns`, `imu_ns`: stamps of the first and of the newest IMU sample. `published`: the topic has a publisher
-        now. `now`, `born`: wall times: now, and when listening began.
+        Parameters
+        ----------
+        first_ns, imu_ns : int
+            Stamps of the first and of the newest IMU sample.
+        published : bool
+            The topic has a publisher now.
+        now, born : float
+            Wall times: now, and when listening began.
 
         Returns
         -------

@@ -25,8 +25,14 @@ SILENT_S = 5.0
 class Heartbeat:
     """Beats once a period.
 
-    `publisher`: of diagnostic_msgs/DiagnosticArray. `period_s`: wall time; 0 never beats. `reached`: newest stamp (ns)
-    of the data, 0 or less before the first.
+    Parameters
+    ----------
+    publisher : Publisher
+        Of diagnostic_msgs/DiagnosticArray.
+    period_s : float
+        Wall time; 0 never beats.
+    reached : callable
+        Newest stamp (ns) of the data, 0 or less before the first.
     """
 
     def __init__(self, node: Node, ticker: Ticker, publisher: Any, period_s: float, reached: Callable[[], int]) -> None:

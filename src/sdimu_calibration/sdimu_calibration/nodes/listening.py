@@ -27,8 +27,12 @@ class Listener:
     A reliable subscription gets nothing at all from a best-effort publisher; a best-effort one would lose
     messages of a reliable publisher that it need not lose.
 
-    `callback`: takes the message, as CDR bytes when `raw`. `late`: ask first for what was sent before this subscription
-    (a node that goes on where it was killed).
+    Parameters
+    ----------
+    callback : callable
+        Takes the message, as CDR bytes when `raw`.
+    late : bool
+        Ask first for what was sent before this subscription (a node that goes on where it was killed).
     """
 
     def __init__(

@@ -33,8 +33,12 @@ GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 class Monitor:
     """Listens to a running test inside the process that shows it; close it after use.
 
-    `start_ns`: stamp of the begin of the test; without it that of the first status that is heard. `first`: sigma (SI)
-    by coefficient at the begin of the test; without it the first that is published.
+    Parameters
+    ----------
+    start_ns : int, optional
+        Stamp of the begin of the test; without it that of the first status that is heard.
+    first : mapping of str to float, optional
+        Sigma (SI) by coefficient at the begin of the test; without it the first that is published.
     """
 
     def __init__(self, start_ns: int | None = None, first: Mapping[str, float] | None = None) -> None:
@@ -67,8 +71,17 @@ class Monitor:
     def add(self, effects: Sequence[str], seconds: float = ANSWER_S) -> str:
         """Let the calibration node take effects into the model, beside those that were added before.
 
-        `effects`: names, equations or files. `seconds`: wall time in which the node must answer. Result: why it did
-        not; empty when it did.
+        Parameters
+        ----------
+        effects : sequence of str
+            Names, equations or files.
+        seconds : float
+            Wall time in which the node must answer.
+
+        Returns
+        -------
+        str
+            Why it did not; empty when it did.
         """
         client = AsyncParameterClient(self._node, "calibration")
         if not self._answered(client.services_are_ready, seconds):

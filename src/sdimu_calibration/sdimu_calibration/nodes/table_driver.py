@@ -58,9 +58,16 @@ SILENCE_S = 120.0
 class Arrival:
     """How a move ended.
 
-    `ok`: the table reached the target and dwelt. `reason`: why not; empty when `ok`. `start_ns`, `arrived_ns`,
-    `end_ns`: stamps of the joint states: before the move, at rest on the target, at the end of the dwell. `angles`: of
-    the joints at the end (rad).
+    Attributes
+    ----------
+    ok : bool
+        The table reached the target and dwelt.
+    reason : str
+        Why not; empty when `ok`.
+    start_ns, arrived_ns, end_ns : int
+        Stamps of the joint states: before the move, at rest on the target, at the end of the dwell.
+    angles : tuple of float
+        Of the joints at the end (rad).
     """
 
     ok: bool
@@ -74,7 +81,10 @@ class Arrival:
 class TableDriver:
     """Drives a table step by step; see the module.
 
-    `node`: gets the parameters `allow_motion`, `ask`, `tolerance_deg`, `rest_deg_s` and the service ``~/confirm``.
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Gets the parameters `allow_motion`, `ask`, `tolerance_deg`, `rest_deg_s` and the service ``~/confirm``.
     """
 
     def __init__(self, node: Node, ticker: Ticker, table: RateTable) -> None:
@@ -125,8 +135,17 @@ class TableDriver:
     def move(self, step: Step, why: str = "", axis: tuple[int, float] | None = None) -> Future:
         """Carry out a step.
 
-        `why`: the reason of the choice, for log, question and ``~/moves``. `axis`: joint and sense, as
-        `core.table.assign_turns` gives them. The result is an `Arrival`; it never holds an exception.
+        Parameters
+        ----------
+        why : str
+            The reason of the choice, for log, question and ``~/moves``.
+        axis : (int, float), optional
+            Joint and sense, as `core.table.assign_turns` gives them.
+
+        Returns
+        -------
+        rclpy.task.Future
+            Its result is an `Arrival`; it never holds an exception.
         """
         future = Future()
         if self._future is not None:

@@ -66,8 +66,12 @@ class Outcome(Enum):
 class MoveProgress:
     """Follows one move.
 
-    `seen`: the joint states before it was sent. `tolerance_rad`, `rest_rad_s`: what counts as being there and as rest
-    (rad, rad/s).
+    Parameters
+    ----------
+    seen : Seen
+        The joint states before it was sent.
+    tolerance_rad, rest_rad_s : float
+        What counts as being there and as rest (rad, rad/s).
     """
 
     def __init__(self, goal: str, move: Move, seen: Seen, tolerance_rad: float, rest_rad_s: float) -> None:

@@ -30,7 +30,10 @@ _NS = 1_000_000_000
 class TransformMessage:
     """Encoder of one message of transforms between named frames; only stamps and rotations change.
 
-    `frames`: parent and child of each transform.
+    Parameters
+    ----------
+    frames : sequence of (str, str)
+        Parent and child of each transform.
     """
 
     def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
@@ -52,7 +55,13 @@ class TransformMessage:
         self._template = bytes((0, 1, 0, 0)) + bytes(data)
 
     def encode(self, stamp_ns: int, rotations: Sequence[Sequence[float]] | Floats) -> bytes:
-        """Encode a message. `rotations`: child against parent: maps vectors of the child to the parent."""
+        """Encode a message.
+
+        Parameters
+        ----------
+        rotations : sequence of quaternions (w, x, y, z), one a transform
+            Child against parent: maps vectors of the child to the parent.
+        """
         out = bytearray(self._template)
         stamp = divmod(int(stamp_ns), _NS)
         for at, place, (w, x, y, z) in zip(self._stamps, self._rotations, rotations, strict=True):

@@ -70,7 +70,10 @@ def sizes(effect: Effect) -> str:
 def page(typeset: bool = False) -> str:
     """Make the page of the catalogue, which the book holds as generated/effects.md.
 
-    `typeset`: equations as browsers typeset them, for the book; else as plain text, for any reader of Markdown.
+    Parameters
+    ----------
+    typeset : bool
+        Equations as browsers typeset them, for the book; else as plain text, for any reader of Markdown.
     """
     parts = [_HEAD]
     for title, effects in grouped():

@@ -27,7 +27,12 @@ _WHOLE_M = 10.0
 class Off:
     """A coefficient that is wrong while an effect is missing.
 
-    `amount`: by how much it is too large, in `unit`. `sigmas`: the same over the sigma that it is given with.
+    Attributes
+    ----------
+    amount : float
+        By how much it is too large, in `unit`.
+    sigmas : float
+        The same over the sigma that it is given with.
     """
 
     name: str
@@ -71,9 +76,16 @@ def wrong_without(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple
 class InUse:
     """How far a navigation without aid drifts with each compensation, over all stretches that no fit has seen.
 
-    `minutes`: length of a navigation. `names`: of the compensations, the worst model first. `distance`: root mean
-    square of the error of position at the end of the stretches (m), one a compensation. `promised`: what the fit of the
-    last compensation expects of the same (m); NaN where there is none.
+    Attributes
+    ----------
+    minutes : float
+        Length of a navigation.
+    names : tuple of str
+        Of the compensations, the worst model first.
+    distance : tuple of float
+        Root mean square of the error of position at the end of the stretches (m), one a compensation.
+    promised : float
+        What the fit of the last compensation expects of the same (m); NaN where there is none.
     """
 
     minutes: float

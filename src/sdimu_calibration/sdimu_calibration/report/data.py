@@ -148,9 +148,14 @@ def stop_grid(found: Residuals, after: bool) -> Grid:
 class Scored:
     """A candidate with its evidence, numbers in `unit` (customary).
 
-    `z`, `left`: score with the model as given, and with what was found added. `smallest`, `prior`: minimal detectable
-    size, and the size that physics gives it (inf where unknown). `retention`: share of its signature that the model
-    leaves.
+    Attributes
+    ----------
+    z, left : float
+        Score with the model as given, and with what was found added.
+    smallest, prior : float
+        Minimal detectable size, and the size that physics gives it (inf where unknown).
+    retention : float
+        Share of its signature that the model leaves.
     """
 
     label: str

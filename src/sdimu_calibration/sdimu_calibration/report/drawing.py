@@ -26,9 +26,21 @@ class Figure:
     The objects of the Python package check every value, which takes seconds a page: only notebooks and the workbench
     need them (`as_plotly`).
 
-    `titles`: above the panels, row by row. `share_x`: panels of a column have the scale of the lowest. `share_y`:
-    panels of a row have the scale of the first. `gap_x`, `gap_y`: between panels, as a share of the figure. `data`:
-    traces; arrays of numbers are kept in single precision.
+    Parameters
+    ----------
+    titles : sequence of str
+        Above the panels, row by row.
+    share_x : bool
+        Panels of a column have the scale of the lowest.
+    share_y : bool
+        Panels of a row have the scale of the first.
+    gap_x, gap_y : float
+        Between panels, as a share of the figure.
+
+    Attributes
+    ----------
+    data : list of dict
+        Traces; arrays of numbers are kept in single precision.
     """
 
     def __init__(

@@ -98,8 +98,14 @@ def _heat_map(drawn: Raster, top: int, grid: Grid, channels: Sequence[str]) -> N
 class _Bars:
     """Bars with a name before and words behind each, over an axis from zero, and a dashed line.
 
-    `top`: upper edge of the first bar (px). `line`: where the dashed line is; not finite leaves it out. `ink`: of the
-    bars.
+    Attributes
+    ----------
+    top : int
+        Upper edge of the first bar (px).
+    line : float
+        Where the dashed line is; not finite leaves it out.
+    ink : tuple of int
+        Of the bars.
     """
 
     drawn: Raster

@@ -61,7 +61,14 @@ class Progress:
 class Outline:
     """What is known of a test before it runs.
 
-    `duration_s`: 0 where nobody knows. `stops`: 0 where nobody knows. `units`: customary unit by coefficient.
+    Attributes
+    ----------
+    duration_s : float
+        0 where nobody knows.
+    stops : int
+        0 where nobody knows.
+    units : mapping of str to str
+        Customary unit by coefficient.
     """
 
     duration_s: float
@@ -83,7 +90,13 @@ def time_words(test: Outline, seen: Progress) -> str:
 
 
 def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
-    """Say how long a test will take at the pace so far. `wall_s`: wall time since the first sample (s)."""
+    """Say how long a test will take at the pace so far.
+
+    Parameters
+    ----------
+    wall_s : float
+        Wall time since the first sample (s).
+    """
     if not test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
         return "time left unknown"
     pace = seen.table_s / wall_s

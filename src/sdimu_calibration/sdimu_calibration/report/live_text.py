@@ -39,8 +39,14 @@ class SeenFamily:
 class SeenChoice:
     """A choice of a test that chooses its turns.
 
-    `text`: move and reason, or why the test ends. `minutes`: of the test, when it was made. `worst`: largest sigma over
-    its limit (1).
+    Attributes
+    ----------
+    text : str
+        Move and reason, or why the test ends.
+    minutes : float
+        Of the test, when it was made.
+    worst : float
+        Largest sigma over its limit (1).
     """
 
     text: str

@@ -27,7 +27,20 @@ def browser() -> str:
 
 
 def print_pdf(page: Path, program: str) -> Path:
-    """Print a page beside itself. `page`: HTML file. `program`: of `browser`. Result: the PDF."""
+    """Print a page beside itself.
+
+    Parameters
+    ----------
+    page : Path
+        HTML file.
+    program : str
+        Of `browser`.
+
+    Returns
+    -------
+    Path
+        The PDF.
+    """
     target = page.with_suffix(".pdf")
     target.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory() as own:

@@ -89,9 +89,16 @@ class Raster:
     ) -> None:
         """Write a line of text; what lies outside of the picture is cut off.
 
-        `x`, `y`: the point that is named (px). `ink`: red, green and blue. `size`: height of the characters (px): one
-        of those in requirements/vendored.py. `across`, `down`: share of the width, and of the height, that lies before
-        the point.
+        Parameters
+        ----------
+        x, y : float
+            The point that is named (px).
+        ink : tuple of int
+            Red, green and blue.
+        size : int
+            Height of the characters (px): one of those in requirements/vendored.py.
+        across, down : float
+            Share of the width, and of the height, that lies before the point.
         """
         covered = _font(size).coverage(words)
         left, top = round(x - across * covered.shape[1]), round(y - down * covered.shape[0])

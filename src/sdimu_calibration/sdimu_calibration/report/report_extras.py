@@ -16,9 +16,16 @@ from sdimu_calibration.core.results import Calibration
 class ReportExtras:
     """Whatever is known; what is empty is left out of the page.
 
-    `table`: axis angles: shown, never used. `trials`: free navigations of segments that no fit has seen. `no_trial`:
-    why there is none. `given`: what a calibration delivers with the model as given, noise with a memory learned without
-    what is missing.
+    Attributes
+    ----------
+    table : TableLog or None
+        Axis angles: shown, never used.
+    trials : tuple of FreeInertialRun
+        Free navigations of segments that no fit has seen.
+    no_trial : str
+        Why there is none.
+    given : Calibration or None
+        What a calibration delivers with the model as given, noise with a memory learned without what is missing.
     """
 
     table: TableLog | None = None
@@ -30,8 +37,10 @@ class ReportExtras:
 def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportExtras:
     """Work out what the page of a diagnosis shows in addition.
 
-    `delivered`: that was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in its
-    place.
+    Parameters
+    ----------
+    delivered : Fit, optional
+        That was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in its place.
     """
     rivals = [("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table

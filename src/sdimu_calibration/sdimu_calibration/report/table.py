@@ -22,9 +22,16 @@ from sdimu_calibration.report.groups import is_free
 class Row:
     """A coefficient, in `unit`; None where there is nothing to say.
 
-    `value`, `sigma`: both zero when the body frame makes the coefficient zero by definition. `truth`, `error`,
-    `error_sigmas`: True value, estimate minus truth, and that over sigma. `reference`: published sigma of its group.
-    `prior`: one sigma by the IMU's file.
+    Attributes
+    ----------
+    value, sigma : float
+        Both zero when the body frame makes the coefficient zero by definition.
+    truth, error, error_sigmas : float or None
+        True value, estimate minus truth, and that over sigma.
+    reference : float or None
+        Published sigma of its group.
+    prior : float or None
+        One sigma by the IMU's file.
     """
 
     name: str
@@ -47,9 +54,19 @@ def rows(
 ) -> list[Row]:
     """Make the rows of the table.
 
-    `truth`: True value (SI) by coefficient name, in the body frame of the calibration. `reference`: published sigma
-    (SI) by effect name. `prior`: one sigma (SI) by the IMU's file, by coefficient name. Result: in the order of the
-    calibration.
+    Parameters
+    ----------
+    truth : mapping of str to float, optional
+        True value (SI) by coefficient name, in the body frame of the calibration.
+    reference : mapping of str to float, optional
+        Published sigma (SI) by effect name.
+    prior : mapping of str to float, optional
+        One sigma (SI) by the IMU's file, by coefficient name.
+
+    Returns
+    -------
+    list of Row
+        In the order of the calibration.
     """
     sigmas = np.sqrt(np.diag(calibration.covariance))
     found = [

@@ -30,6 +30,10 @@ def raw_test(samples: Mapping[str, Any]) -> RawTest:
         ``t`` (s) or ``ns`` (integers), shape (n,): end of the interval of each sample. ``gyro`` and ``accel``, shape
         (n, 3), or their columns ``gyro_x`` ... ``accel_z``: body rate and specific force, mean over the interval.
         Optional: ``temperature`` (deg C), and ``dwell`` (true at rest) with ``stop`` (integers), shape (n,).
+
+    Returns
+    -------
+    RawTest
     """
     if not hasattr(samples, "keys"):
         raise DataError(

@@ -31,8 +31,12 @@ too tight misleads, one that is too wide costs little."""
 class Source:
     """What the user says of a recording; everything left out is recognised.
 
-    `accel_unit`, `gyro_unit`: such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``. `accel_sign`,
-    `gyro_sign`: -1 when the negative of the specific force, or of the rate, was recorded.
+    Attributes
+    ----------
+    accel_unit, gyro_unit : str or None
+        Such as ``g`` and ``deg/s``, or a multiple such as ``2 deg/s``.
+    accel_sign, gyro_sign : int or None
+        -1 when the negative of the specific force, or of the rate, was recorded.
     """
 
     topics: TopicChoice = field(default_factory=TopicChoice)
@@ -82,9 +86,16 @@ def opening_options(
 ) -> OpeningOptions:
     """Put what the user says of a test together; command line and live node use this one function.
 
-    `site`: name or path; None takes `DEFAULT_SITE`, which a note then says. `imu`: None proposes one of `CLASSES` from
-    the rests, which a note then says. `handheld`: moved by hand; None decides by the turns and the noise of the gyros.
-    `measured_noise`: replace the white noise of the specification by that of the rests.
+    Parameters
+    ----------
+    site : str or None
+        Name or path; None takes `DEFAULT_SITE`, which a note then says.
+    imu : ImuSpecification or None
+        None proposes one of `CLASSES` from the rests, which a note then says.
+    handheld : bool, optional
+        Moved by hand; None decides by the turns and the noise of the gyros.
+    measured_noise : bool
+        Replace the white noise of the specification by that of the rests.
     """
     assumed = DEFAULT_SITE if site is None else ""
     classes = tuple(map(load_imu, CLASSES)) if imu is None else ()
@@ -103,14 +114,17 @@ def open_test(
 ) -> PreparedTest:
     """Read a bag and make it ready for an estimator.
 
-    Its site is None where a handheld run states none.
-
     Parameters
     ----------
     site, imu, handheld, measured_noise
         As for `opening_options`.
     source : Source, optional
         Topics, units and signs; what is left out is recognised.
+
+    Returns
+    -------
+    PreparedTest
+        Its site is None where a handheld run states none.
     """
     source = source or Source()
     options = opening_options(site, imu, source, handheld, measured_noise)

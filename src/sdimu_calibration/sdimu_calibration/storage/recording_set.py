@@ -35,8 +35,12 @@ _KEPT_OPEN = 2
 class BagSource:
     """Opens a bag of a set; another process can do so too.
 
-    `site`, `imu`: as the options of the same names. `reference_degc`: temperature from which temperature effects count
-    (deg C); None is that at the start of the recording.
+    Attributes
+    ----------
+    site, imu : str or None
+        As the options of the same names.
+    reference_degc : float or None
+        Temperature from which temperature effects count (deg C); None is that at the start of the recording.
     """
 
     bag: Path
@@ -64,7 +68,15 @@ def _opened(of: BagSource, _: tuple[FileState, ...]) -> PreparedTest:
 
 @dataclass(frozen=True)
 class RecordingSet:
-    """A set as it is written. `members`: each opens a `BagSource`. `model`: name or path."""
+    """A set as it is written.
+
+    Attributes
+    ----------
+    members : tuple of Member
+        Each opens a `BagSource`.
+    model : str or None
+        Name or path.
+    """
 
     members: tuple[Member, ...]
     model: str | None = None
@@ -103,8 +115,12 @@ class _SetFile(Schema):
 def load_set(path: Path, like: BagSource) -> RecordingSet:
     """Read a set.
 
-    `path`: bags are named from its folder. `like`: what the user states for all recordings; the file's own site and IMU
-    come before it.
+    Parameters
+    ----------
+    path : Path
+        Bags are named from its folder.
+    like : BagSource
+        What the user states for all recordings; the file's own site and IMU come before it.
     """
     path = Path(path)
     file = read_yaml(path, _SetFile)
@@ -129,7 +145,10 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
 def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
     """Make a set of bags; power-on and serial are those that the bags say.
 
-    `like`: what the user states for all of them.
+    Parameters
+    ----------
+    like : BagSource
+        What the user states for all of them.
     """
     names = [bag.resolve().name for bag in bags]
     unique = len(set(names)) == len(names)
@@ -143,7 +162,14 @@ def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
 def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], estimator: str) -> SetOptions:
     """Say how a set is to be fitted: what is asked for comes before what its file says.
 
-    `model`: name or path. `add`: effects to add. `estimator`: ``auto`` is that of the file.
+    Parameters
+    ----------
+    model : str or None
+        Name or path.
+    add : sequence of str
+        Effects to add.
+    estimator : str
+        ``auto`` is that of the file.
     """
     chosen = estimator if estimator != AUTO else wanted.estimator
     by_hand = chosen == HANDHELD or (chosen == AUTO and _moved_by_hand(wanted.members))
@@ -233,7 +259,10 @@ _UNSAID = Said()
 def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID) -> None:
     """Write a first set file of bags, with what they or the user say of unit and power-on, for the user to complete.
 
-    `path`: file to make; bags are named from its folder.
+    Parameters
+    ----------
+    path : Path
+        File to make; bags are named from its folder.
     """
     path = Path(path)
     if path.exists():

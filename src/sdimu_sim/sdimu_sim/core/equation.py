@@ -39,8 +39,15 @@ _QUANTITY = re.compile(r"(\d[\d.]*) (s|deg)\b")
 def read_equation(key: EffectKey, sensor: str, formula: str) -> tuple[str, Expression, float]:
     """Read an equation.
 
-    `key`: with its size; its option `name` says of which coefficient of an effect file it is a part. Result: name that
-    an estimate has; formula times k in the variables of `sdimu_sim.core.hidden`; k (SI).
+    Parameters
+    ----------
+    key : EffectKey
+        With its size; its option `name` says of which coefficient of an effect file it is a part.
+
+    Returns
+    -------
+    (str, Expression, float)
+        Name that an estimate has; formula times k in the variables of `sdimu_sim.core.hidden`; k (SI).
     """
     text = equation_text(_QUANTITY.sub(r"(\1*\2)", formula))
     known = frozenset(_DIMENSIONS)

@@ -41,7 +41,13 @@ _AROUND = 20
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula that has been checked. `names`: variables it reads."""
+    """A formula that has been checked.
+
+    Attributes
+    ----------
+    names : frozenset of str
+        Variables it reads.
+    """
 
     text: str
     tree: ast.expr
@@ -57,8 +63,12 @@ class Expression:
 def parse_expression(text: str, known: Collection[str]) -> Expression:
     """Read a formula.
 
-    `text`: numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max.
-    `known`: names that may be used.
+    Parameters
+    ----------
+    text : str
+        Numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max.
+    known : collection of str
+        Names that may be used.
     """
     if len(text) > _LONGEST:
         raise DataError(f"expression is longer than {_LONGEST} characters")

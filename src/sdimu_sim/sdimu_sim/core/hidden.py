@@ -203,8 +203,16 @@ _SITE = {
 class Term:
     """Something added to one sensor's output.
 
-    `sensor`: index in `SENSORS`. `expression`: rad/s or m/s^2. `parameters`: k and others, SI; constants for the
-    expression. `memory`: what `y` is in the expression, as in `Row`; empty where it remembers nothing.
+    Attributes
+    ----------
+    sensor : int
+        Index in `SENSORS`.
+    expression : Expression
+        rad/s or m/s^2.
+    parameters : mapping of str to float
+        k and others, SI; constants for the expression.
+    memory : tuple of str
+        What `y` is in the expression, as in `Row`; empty where it remembers nothing.
     """
 
     name: str
@@ -237,9 +245,16 @@ class SiteError(NamedTuple):
 class Hidden:
     """All hidden effects of a test.
 
-    `delay_s`: of each of the six sensors (>= 0). `lever_arm_m`: components of the lever arm that are given.
-    `coefficients`: of the baseline (SI), as built. `sizes`: size (SI) of every effect but the coefficients of the
-    baseline, by the name that its estimate has.
+    Attributes
+    ----------
+    delay_s : tuple of float
+        Of each of the six sensors (>= 0).
+    lever_arm_m : mapping of int to float
+        Components of the lever arm that are given.
+    coefficients : mapping of str to float
+        Of the baseline (SI), as built.
+    sizes : mapping of str to float
+        Size (SI) of every effect but the coefficients of the baseline, by the name that its estimate has.
     """
 
     terms: tuple[Term, ...] = ()
@@ -337,7 +352,10 @@ def canonical(text: str) -> str:
 def parse_effects(texts: Iterable[str]) -> Hidden:
     """Read hidden effects.
 
-    `texts`: canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
+    Parameters
+    ----------
+    texts : iterable of str
+        Canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
     """
     found = _Found()
     for text in texts:

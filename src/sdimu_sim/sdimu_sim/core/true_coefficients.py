@@ -37,8 +37,15 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
     accelerometers at every temperature: the sensor is turned exactly at temperatures over the range, and what it is
     there is written as polynomials again. The gyros see how the frame turns, as a bias that follows the rate.
 
-    `frame`: ``prior`` or ``accelerometer_triad``. Result: the thirty coefficients and the size of every named effect,
-    SI.
+    Parameters
+    ----------
+    frame : str
+        ``prior`` or ``accelerometer_triad``.
+
+    Returns
+    -------
+    dict of str to float
+        The thirty coefficients and the size of every named effect, SI.
     """
     sizes = dict(parse_effects(truth.effects).sizes)
     out = in_body_frame(truth.coefficients, frame) | sizes

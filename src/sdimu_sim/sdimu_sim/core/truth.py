@@ -124,8 +124,12 @@ def draw_coefficients(imu: ImuSpecification, seed: int) -> dict[str, float]:
 def turned_on(coefficients: Mapping[str, float], sigma: Mapping[str, float], seed: int) -> dict[str, float]:
     """Draw how coefficients of a unit differ in one power-on.
 
-    `coefficients`: of the unit (SI). `sigma`: by group, such as ``gyro_bias``, how far each of its coefficients differs
-    (SI).
+    Parameters
+    ----------
+    coefficients : mapping of str to float
+        Of the unit (SI).
+    sigma : mapping of str to float
+        By group, such as ``gyro_bias``, how far each of its coefficients differs (SI).
     """
     out = dict(coefficients)
     for group, size in sigma.items():
@@ -148,7 +152,12 @@ def input_axes(triad: str, coefficients: Mapping[str, float]) -> Floats:
 
     Each axis is the body axis really turned by its two angles (one rotation vector), times 1 + scale.
 
-    `triad`: ``gyro`` or ``accel``. `coefficients`: as built.
+    Parameters
+    ----------
+    triad : str
+        ``gyro`` or ``accel``.
+    coefficients : mapping of str to float
+        As built.
 
     Returns
     -------
@@ -192,9 +201,18 @@ def in_body_frame(coefficients: Mapping[str, float], frame: str) -> dict[str, fl
     from the angles by second order. The frame ``accelerometer_triad`` is reached by the exact rotation R for
     which ``M_a R^T`` is lower triangular with positive diagonal; there q_xy = q_xz = q_yx = 0.
 
-    `coefficients`: as built. `frame`: ``prior`` (the frame in which it was built) or ``accelerometer_triad``. Result:
-    the thirty coefficients, SI. Mass unbalance that the rotation moves outside the six terms (an arcminute of it) is
-    left out.
+    Parameters
+    ----------
+    coefficients : mapping of str to float
+        As built.
+    frame : str
+        ``prior`` (the frame in which it was built) or ``accelerometer_triad``.
+
+    Returns
+    -------
+    dict of str to float
+        The thirty coefficients, SI. Mass unbalance that the rotation moves outside the six terms (an
+        arcminute of it) is left out.
     """
     if frame not in ("prior", "accelerometer_triad"):
         raise DataError(f"unknown body frame '{frame}' (expected accelerometer_triad or prior)")

@@ -21,7 +21,10 @@ _ALIKE = 4
 def rows(done: Study, units: Mapping[str, str]) -> list[list[str]]:
     """One row of `HEADINGS` a coefficient; numbers in its customary unit.
 
-    `units`: customary unit of each coefficient.
+    Parameters
+    ----------
+    units : mapping of str to str
+        Customary unit of each coefficient.
     """
     out: dict[str, list[str]] = {}
     for one in done.people.out:

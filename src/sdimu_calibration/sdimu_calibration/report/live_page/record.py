@@ -28,7 +28,14 @@ PARTS = (HEAD, CURVES, STOPS, DIAGNOSIS, CHOICES, ANSWER)
 class End:
     """How a test ended.
 
-    `good`: it came to its end. `words`: one sentence. `command`: shows the report; empty where there is none.
+    Attributes
+    ----------
+    good : bool
+        It came to its end.
+    words : str
+        One sentence.
+    command : str
+        Shows the report; empty where there is none.
     """
 
     good: bool
@@ -40,7 +47,12 @@ class End:
 class Head:
     """Where a test is, in words.
 
-    `share`: of the test that is done (0 to 1); None where nobody knows how long it is. `end`: None while more may come.
+    Attributes
+    ----------
+    share : float or None
+        Of the test that is done (0 to 1); None where nobody knows how long it is.
+    end : End or None
+        None while more may come.
     """
 
     place: str = "waiting for the first message"
@@ -54,8 +66,14 @@ class Head:
 class _Kept:
     """What a record holds.
 
-    `nis`: stop, and mean squared innovation per degree of freedom by channel. `errors`: stop that a diagnosis is of,
-    and the error of each model. `joined_s`: time of the test (s) from which it was watched.
+    Attributes
+    ----------
+    nis : tuple of (int, mapping)
+        Stop, and mean squared innovation per degree of freedom by channel.
+    errors : tuple of (int, rows)
+        Stop that a diagnosis is of, and the error of each model.
+    joined_s : float
+        Time of the test (s) from which it was watched.
     """
 
     head: Head = field(default_factory=Head)
@@ -80,7 +98,12 @@ class LiveView(_Kept):
 class LiveRecord:
     """What was seen of a test so far, and what its page asks for.
 
-    `test`: what was known before. `folder`: of the results; empty where nobody knows.
+    Parameters
+    ----------
+    test : Outline
+        What was known before.
+    folder : str
+        Of the results; empty where nobody knows.
     """
 
     def __init__(self, test: Outline, folder: str = "") -> None:
@@ -95,8 +118,12 @@ class LiveRecord:
     def take(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Take what is seen now.
 
-        `streaming`: samples still come; False while the whole test is calibrated once more. `wall_s`: wall time that
-        the test has taken so far (s).
+        Parameters
+        ----------
+        streaming : bool
+            Samples still come; False while the whole test is calibrated once more.
+        wall_s : float
+            Wall time that the test has taken so far (s).
         """
         fallen = tuple(falling(seen.first, seen.sigmas, self._test.units, self._test.effects))
         head = self._where(seen, streaming, wall_s)
@@ -165,7 +192,10 @@ class LiveRecord:
     def carry_out(self, add: Callable[[list[str]], str]) -> None:
         """Let a test take the effects that pages asked for, and keep its answer.
 
-        `add`: takes effects, and returns why they were not added; empty when they were.
+        Parameters
+        ----------
+        add : callable
+            Takes effects, and returns why they were not added; empty when they were.
         """
         while (effect := self._next_asked()) is not None:
             why = add([effect])

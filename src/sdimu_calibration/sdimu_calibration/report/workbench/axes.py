@@ -18,7 +18,10 @@ TIME, STOP = "time (s)", "stop"
 def axes(diagnosis: Diagnosis) -> Mapping[str, Floats]:
     """Give every variable at every epoch.
 
-    `diagnosis`: of a fit that navigates.
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a fit that navigates.
 
     Returns
     -------

@@ -22,9 +22,15 @@ _SERVED = files("sdimu_calibration.report.workbench").joinpath("served.js").read
 def application(name: str, host: str, style: str, script: str) -> Dash:
     """Make an application of one page, without its layout.
 
-    `name`: of the program; also the title of the page. `host`: address of this machine that it is served at. `style`,
-    `script`: what the page has beyond the look of all pages and what `served.js` does on each: a page has the elements
-    ``lost``, which is shown when its command answers no more, and ``look``.
+    Parameters
+    ----------
+    name : str
+        Of the program; also the title of the page.
+    host : str
+        Address of this machine that it is served at.
+    style, script : str
+        What the page has beyond the look of all pages and what `served.js` does on each: a page has the elements
+        ``lost``, which is shown when its command answers no more, and ``look``.
     """
     app = Dash(name, title=name, update_title="", serve_locally=True, assets_ignore=".*", on_error=tell_error)
     guard(app.server, host)

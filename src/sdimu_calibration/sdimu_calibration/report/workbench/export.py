@@ -66,7 +66,12 @@ def _in_si(prior: StatedPrior) -> dict[str, str]:
 def command(setting: Setting, bag: str, options: Sequence[str] = ()) -> str:
     """Command that gives the same numbers, for the folder in which the archive is unpacked.
 
-    `bag`: place or name of the recording. `options`: words that say how it is opened.
+    Parameters
+    ----------
+    bag : str
+        Place or name of the recording.
+    options : sequence of str
+        Words that say how it is opened.
     """
     out = ["sdimu", "calibrate", shlex.quote(bag), "--model", "model.yaml", *map(shlex.quote, options)]
     if setting.held:

@@ -124,7 +124,12 @@ class Missing:
 class Preview:
     """A candidate before it is added, by the linear model.
 
-    `effect`: the first, where a text gives several. `residuals`: `before` and `after` it is added.
+    Attributes
+    ----------
+    effect : Effect
+        The first, where a text gives several.
+    residuals : Residuals
+        `before` and `after` it is added.
     """
 
     effect: Effect

@@ -16,9 +16,16 @@ _MOST_OPEN = 3
 class RecordingCache:
     """Recordings by name; a bench is made when one is first asked for.
 
-    `names`: the first is the one a fresh page shows. `make`: opens the recording of a name; raises DataError. `places`:
-    where they are; a command that is taken home names a recording without a place by its name. `options`: words of the
-    command line that say how they are opened.
+    Parameters
+    ----------
+    names : sequence of str
+        The first is the one a fresh page shows.
+    make : callable
+        Opens the recording of a name; raises DataError.
+    places : mapping of str to Path, optional
+        Where they are; a command that is taken home names a recording without a place by its name.
+    options : sequence of str
+        Words of the command line that say how they are opened.
     """
 
     def __init__(

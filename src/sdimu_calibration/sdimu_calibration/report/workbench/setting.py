@@ -15,9 +15,16 @@ Prior = tuple[str, str, str]
 class Setting:
     """What is fitted.
 
-    `added`: effects added to the model, in order: what `sdimu calibrate --add` takes, or the text of an effect file.
-    `held`: stops left out of the fit, ascending. `cut`: spans of time (s) left out, ascending and apart. `priors`:
-    coefficients with a prior of their own.
+    Attributes
+    ----------
+    added : tuple of str
+        Effects added to the model, in order: what `sdimu calibrate --add` takes, or the text of an effect file.
+    held : tuple of int
+        Stops left out of the fit, ascending.
+    cut : tuple of (float, float)
+        Spans of time (s) left out, ascending and apart.
+    priors : tuple of (str, str, str)
+        Coefficients with a prior of their own.
     """
 
     added: tuple[str, ...] = ()

@@ -50,9 +50,22 @@ def raw_messages(
 ) -> dict[str, RawMessages]:
     """Read the CDR bytes of the messages of some topics.
 
-    `path`: folder or file. `wanted`: type (such as ``sensor_msgs/msg/Imu``) by topic. A topic that is absent is left
-    out of the answer, unless it is `required`. `required`: the topic that must be there with at least one message.
-    `kept`: makes what the messages of a topic go into, from its type. Result: messages in the order of the bag.
+    Parameters
+    ----------
+    path : Path
+        Folder or file.
+    wanted : mapping of str to str
+        Type (such as ``sensor_msgs/msg/Imu``) by topic. A topic that is absent is left out of the answer,
+        unless it is `required`.
+    required : str
+        The topic that must be there with at least one message.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
+
+    Returns
+    -------
+    dict of str to RawMessages
+        Messages in the order of the bag.
     """
 
     def takes(topic: str, type_name: str) -> bool:
@@ -75,8 +88,14 @@ def check_filled(path: Path, topic: str, raw: RawMessages) -> None:
 def read_topics(path: Path, takes: Takes, kept: Keep = lambda _: RawMessages()) -> dict[str, TopicContent]:
     """Read the messages of the topics that are wanted; the others come without messages.
 
-    `path`: rosbag2 folder, .mcap or .db3 file (packed by zstd or not), ROS 1 bag. `takes`: asked with name and type of
-    every topic. `kept`: makes what the messages of a topic go into, from its type.
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder, .mcap or .db3 file (packed by zstd or not), ROS 1 bag.
+    takes : callable
+        Asked with name and type of every topic.
+    kept : callable
+        Makes what the messages of a topic go into, from its type.
     """
     content: dict[str, TopicContent] = {}
 

@@ -47,7 +47,12 @@ def check_room(path: Path, replace: bool) -> None:
 def check_apart(source: Path | Iterable[Path], target: Path) -> None:
     """Raise DataError when what is read would be replaced by what is written.
 
-    `source`: files or folders that are read. `target`: folder to make.
+    Parameters
+    ----------
+    source : Path or iterable of Path
+        Files or folders that are read.
+    target : Path
+        Folder to make.
     """
     folder = Path(target)
     for path in [source] if isinstance(source, Path) else source:

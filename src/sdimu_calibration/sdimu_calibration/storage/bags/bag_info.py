@@ -17,8 +17,16 @@ from sdimu_calibration.storage.bags.mcap_walk import DamagedError, McapWalk
 class BagInfo:
     """Content of a bag.
 
-    `types`: type by topic. `counts`: messages by topic. `first_ns`, `last_ns`: first and last log time (ns); 0 without
-    messages. `damaged`: files that end before their footer; the bag itself where they are packed in it.
+    Attributes
+    ----------
+    types : dict of str to str
+        Type by topic.
+    counts : dict of str to int
+        Messages by topic.
+    first_ns, last_ns : int
+        First and last log time (ns); 0 without messages.
+    damaged : list of Path
+        Files that end before their footer; the bag itself where they are packed in it.
     """
 
     types: dict[str, str] = field(default_factory=dict)

@@ -46,7 +46,12 @@ def write_metadata(
 ) -> None:
     """Write metadata.yaml into `folder`, whole or not at all.
 
-    `files`: in the order in which they are to be read. `custom`: what the user says of the recording.
+    Parameters
+    ----------
+    files : sequence of FileEntry
+        In the order in which they are to be read.
+    custom : mapping of str to str, optional
+        What the user says of the recording.
     """
     filled = [file for file in files if file.count] or list(files)
     whole = FileEntry("", min(f.first_ns for f in filled), max(f.last_ns for f in filled), sum(f.count for f in files))

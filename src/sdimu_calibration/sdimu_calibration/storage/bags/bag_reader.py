@@ -29,9 +29,17 @@ def read_recording(path: Path, topics: Topics | TopicChoice | None = None) -> Re
     Samples that are not finite and samples with a stamp that was there before are dropped and counted;
     samples out of order are sorted by stamp. `notes` say what was mended.
 
-    `path`: rosbag2 folder (MCAP or SQLite, compressed or not), a bare .mcap or .db3 file, or a bag of ROS 1. `topics`:
-    names of the topics; those that are not named are chosen by name and type of what is there. Result: time counts from
-    one nominal sample interval before the first stamp.
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder (MCAP or SQLite, compressed or not), a bare .mcap or .db3 file, or a bag of ROS 1.
+    topics : Topics or TopicChoice, optional
+        Names of the topics; those that are not named are chosen by name and type of what is there.
+
+    Returns
+    -------
+    Recording
+        Time counts from one nominal sample interval before the first stamp.
     """
     path = Path(path)
     notes: list[str] = []

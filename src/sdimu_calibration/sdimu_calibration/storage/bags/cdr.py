@@ -116,7 +116,10 @@ def as_bytes(messages: NDArray[Any]) -> list[bytes]:
 def stamp_of(message: bytes) -> int:
     """Stamp (ns) of the header with which a message begins, in the byte order that it names.
 
-    Raises LayoutError when the message ends before its stamp does.
+    Raises
+    ------
+    LayoutError
+        When the message ends before its stamp does.
     """
     if len(message) < WITH_STAMP:
         raise LayoutError("message too short")
@@ -243,8 +246,6 @@ def encode_status(stamp_ns: Stamps, dwell: Bools, stop: Ints, frame_id: str = "r
 def decode_imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
     """Decode sensor_msgs/Imu.
 
-    Raises LayoutError when the bytes are not what a constant layout says.
-
     Parameters
     ----------
     raw : sequence of bytes, length n
@@ -254,6 +255,11 @@ def decode_imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
     stamp_ns : ndarray, shape (n,)
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         Rate (rad/s) and specific force (m/s^2).
+
+    Raises
+    ------
+    LayoutError
+        When the bytes are not what a constant layout says.
     """
     stamp_ns, (omega, force) = _decode_parts(raw, _IMU_DOUBLES, (_RATE, _FORCE))
     return stamp_ns, omega, force
@@ -261,8 +267,6 @@ def decode_imu(raw: Sequence[bytes]) -> tuple[Stamps, Floats, Floats]:
 
 def decode_doubles(raw: Sequence[bytes], number: int) -> tuple[Stamps, Floats]:
     """Decode messages made of a header and `number` doubles, whatever the length of frame_id.
-
-    Raises LayoutError when a message is not made so.
 
     Parameters
     ----------
@@ -272,6 +276,11 @@ def decode_doubles(raw: Sequence[bytes], number: int) -> tuple[Stamps, Floats]:
     -------
     stamp_ns : ndarray, shape (n,)
     values : ndarray, shape (n, number)
+
+    Raises
+    ------
+    LayoutError
+        When a message is not made so.
     """
     stamp_ns, (values,) = _decode_parts(raw, number, (slice(0, number),))
     return stamp_ns, values
@@ -342,7 +351,10 @@ class _Cursor:
 def decode_status(message: bytes) -> tuple[str, dict[str, str]]:
     """Decode text and values of the first entry of a diagnostic_msgs/DiagnosticArray; nothing when there is none.
 
-    Raises LayoutError when the message ends before the entry does.
+    Raises
+    ------
+    LayoutError
+        When the message ends before the entry does.
     """
     cursor = _Cursor(message)
     if not cursor.count():
@@ -355,7 +367,10 @@ def decode_status(message: bytes) -> tuple[str, dict[str, str]]:
 def decode_joint_state(message: bytes) -> tuple[tuple[str, ...], Floats]:
     """Decode names (length k) and angles (rad), shape (k,), of a sensor_msgs/JointState.
 
-    Raises LayoutError when the message ends before they do.
+    Raises
+    ------
+    LayoutError
+        When the message ends before they do.
     """
     cursor = _Cursor(message)
     return tuple(cursor.string() for _ in range(cursor.count())), cursor.doubles()
@@ -370,8 +385,6 @@ def decode_stamps(rows: Rows) -> Stamps:
 def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: Floats) -> tuple[Stamps, Floats]:
     """Decode the angles of sensor_msgs/JointState that all name the same axes.
 
-    Raises LayoutError when not all messages share a layout with one position an axis.
-
     Parameters
     ----------
     raw : sequence of bytes, length n
@@ -385,6 +398,11 @@ def decode_joint_positions(raw: Sequence[bytes], names: tuple[str, ...], first: 
     stamp_ns : ndarray, shape (n,)
     position : ndarray, shape (n, k)
         Angles (rad).
+
+    Raises
+    ------
+    LayoutError
+        When not all messages share a layout with one position an axis.
     """
     messages = raw if isinstance(raw, RawMessages) else RawMessages(raw)
     size = np.unique(np.concatenate([block.length for block in messages.blocks()]))

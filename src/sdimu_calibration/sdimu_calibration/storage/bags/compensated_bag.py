@@ -43,8 +43,14 @@ def write_compensated(
 ) -> Written:
     """Write a bag with the compensated samples of a recording, and its other topics as they are.
 
-    `source`: bag of the recording, from which the other topics are copied. `target`: folder to make. `replace`: delete
-    a bag that is already there.
+    Parameters
+    ----------
+    source : Path
+        Bag of the recording, from which the other topics are copied.
+    target : Path
+        Folder to make.
+    replace : bool
+        Delete a bag that is already there.
     """
     check_apart(source, target)
     check_room(target, replace)

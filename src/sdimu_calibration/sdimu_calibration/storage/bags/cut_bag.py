@@ -32,8 +32,16 @@ def cut_bag(source: Path, target: Path, first_s: float, last_s: float, *, replac
 
     A table says its phase when it changes: the last status before the cut is kept, with the stamp of the cut.
 
-    `source`: bag of any kind that is read. `target`: folder to make. `first_s`, `last_s`: seconds since the first stamp
-    of an IMU, as errors and reports count them; both ends are kept. `replace`: delete a bag that is already there.
+    Parameters
+    ----------
+    source : Path
+        Bag of any kind that is read.
+    target : Path
+        Folder to make.
+    first_s, last_s : float
+        Seconds since the first stamp of an IMU, as errors and reports count them; both ends are kept.
+    replace : bool
+        Delete a bag that is already there.
     """
     check_apart(source, target)
     check_room(target, replace)

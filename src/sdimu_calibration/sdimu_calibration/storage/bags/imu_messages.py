@@ -92,7 +92,10 @@ class ImuMessages(RawMessages):
     def samples(self, one_by_one: Callable[[Sequence[bytes]], Samples]) -> Samples:
         """Return stamps (n,) (ns), rates (n, 3) (rad/s) and specific forces (n, 3) (m/s^2) of the main `frame_id`.
 
-        `one_by_one`: reads the messages of blocks that have no layout in common.
+        Parameters
+        ----------
+        one_by_one : callable
+            Reads the messages of blocks that have no layout in common.
         """
         self._close()
         ns, omega, force = self._all(one_by_one)

@@ -37,8 +37,16 @@ class McapBag:
     exception leaves nothing, and what was in its place stays. A live recording is written in its place instead, with
     a metadata.yaml from the start: cut by a crash it is still a folder that `sdimu bag recover` can mend.
 
-    `path`: folder to make. `replace`: delete a bag that is already there. `live`: write in place. `custom`: what the
-    user says of the recording, for its metadata.
+    Parameters
+    ----------
+    path : Path
+        Folder to make.
+    replace : bool
+        Delete a bag that is already there.
+    live : bool
+        Write in place.
+    custom : mapping of str to str, optional
+        What the user says of the recording, for its metadata.
     """
 
     def __init__(
@@ -72,7 +80,15 @@ class McapBag:
     def topic(self, name: str, type_name: str) -> int:
         """Announce a topic; announcing it again with the same type does nothing.
 
-        `name`, `type_name`: such as ``/imu/data_raw`` and ``sensor_msgs/msg/Imu``. Result: MCAP channel.
+        Parameters
+        ----------
+        name, type_name : str
+            Such as ``/imu/data_raw`` and ``sensor_msgs/msg/Imu``.
+
+        Returns
+        -------
+        int
+            MCAP channel.
         """
         known = self._topics.get(name)
         if known is not None:
@@ -90,9 +106,15 @@ class McapBag:
     def write(self, name: str, data: bytes, log_time_ns: int) -> None:
         """Append a message.
 
-        `name`: an announced topic. `data`: the message in CDR, with its 4-byte encapsulation header. `log_time_ns`:
-        time (ns) under which it is filed: the stamp in its header, where it has one; 0 for one before 1970, which the
-        format cannot say.
+        Parameters
+        ----------
+        name : str
+            An announced topic.
+        data : bytes
+            The message in CDR, with its 4-byte encapsulation header.
+        log_time_ns : int
+            Time (ns) under which it is filed: the stamp in its header, where it has one; 0 for one before 1970, which
+            the format cannot say.
         """
         topic, log_time_ns = self._topics[name], max(log_time_ns, 0)
         with self._told():

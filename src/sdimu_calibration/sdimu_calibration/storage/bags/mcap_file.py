@@ -34,7 +34,10 @@ _CHUNK_BYTES = 1 << 20
 class McapFile:
     """Writer of zstd chunks with message indices, summary and footer.
 
-    `stream`: open for writing, at its start; it stays open when the file is finished.
+    Parameters
+    ----------
+    stream : binary file
+        Open for writing, at its start; it stays open when the file is finished.
     """
 
     def __init__(self, stream: BinaryIO) -> None:

@@ -138,8 +138,19 @@ class _Source:
 class McapWalk:
     """Walk over the messages of an MCAP file, once.
 
-    `most`: bytes that its chunks may unpack to; by the size of the file when left out. `profile`: ``ros2`` for a
-    recording of ROS 2. `channels`: those met until now. `schemas`: those met until now.
+    Parameters
+    ----------
+    most : int, optional
+        Bytes that its chunks may unpack to; by the size of the file when left out.
+
+    Attributes
+    ----------
+    profile : str
+        ``ros2`` for a recording of ROS 2.
+    channels : dict of int to mcap.records.Channel
+        Those met until now.
+    schemas : dict of int to mcap.records.Schema
+        Those met until now.
     """
 
     def __init__(self, path: Path, most: int | None = None) -> None:
@@ -158,7 +169,10 @@ class McapWalk:
     def blocks(self) -> Iterator[Messages]:
         """Yield messages chunk by chunk, in the order of the file.
 
-        Raises DamagedError when the file ends before its footer; what was yielded until then is whole.
+        Raises
+        ------
+        DamagedError
+            When the file ends before its footer; what was yielded until then is whole.
         """
         with self.path.open("rb") as stream:
             try:

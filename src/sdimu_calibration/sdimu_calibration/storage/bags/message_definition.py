@@ -30,7 +30,13 @@ _KNOWN = {("tf2_msgs", "TFMessage"): "geometry_msgs/TransformStamped[] transform
 
 @cache
 def definition(type_name: str) -> str:
-    """Text of a message type and of all types in it. `type_name`: such as ``sensor_msgs/msg/Imu``."""
+    """Text of a message type and of all types in it.
+
+    Parameters
+    ----------
+    type_name : str
+        Such as ``sensor_msgs/msg/Imu``.
+    """
     package, name = _split(type_name)
     texts = {(package, name): _text(package, name)}
     waiting = [(package, name)]

@@ -24,8 +24,16 @@ _NO_SCHEMA = Schema(0, b"", "", "")
 class Salvage:
     """What one file gave.
 
-    `damage`: what was wrong; empty for a whole file, which is left as it is. `counts`: messages saved, by topic.
-    `first_ns`, `last_ns`: first and last log time (ns) of the messages. `topics`: for metadata.yaml.
+    Attributes
+    ----------
+    damage : str
+        What was wrong; empty for a whole file, which is left as it is.
+    counts : dict of str to int
+        Messages saved, by topic.
+    first_ns, last_ns : int
+        First and last log time (ns) of the messages.
+    topics : dict of str to TopicEntry
+        For metadata.yaml.
     """
 
     path: Path
@@ -41,7 +49,15 @@ def recover(path: Path) -> tuple[Salvage, ...]:
 
     The cut file stays beside the mended one with ``.damaged`` at its name.
 
-    `path`: rosbag2 folder or .mcap file. Result: one a file.
+    Parameters
+    ----------
+    path : Path
+        rosbag2 folder or .mcap file.
+
+    Returns
+    -------
+    tuple of Salvage
+        One a file.
     """
     parts = bag_parts(Path(path))
     for part in parts:

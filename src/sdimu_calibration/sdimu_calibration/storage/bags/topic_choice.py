@@ -17,8 +17,16 @@ from sdimu_calibration.storage.bags.raw_messages import RawMessages
 class Topics:
     """Topics of a recording.
 
-    `imu`: sensor_msgs/Imu; the only one that must be there. `status`: diagnostic_msgs/DiagnosticArray of the rate
-    table. `joint_states`: sensor_msgs/JointState of the rate table. `temperature`: sensor_msgs/Temperature of the IMU.
+    Attributes
+    ----------
+    imu : str
+        sensor_msgs/Imu; the only one that must be there.
+    status : str
+        diagnostic_msgs/DiagnosticArray of the rate table.
+    joint_states : str
+        sensor_msgs/JointState of the rate table.
+    temperature : str
+        sensor_msgs/Temperature of the IMU.
     """
 
     imu: str = "/imu/data_raw"
@@ -51,8 +59,19 @@ def choose(
 ) -> Topics:
     """Choose the topics.
 
-    `path`: for the messages to the user. `is_phase`: whether a diagnostic message says ``dwell`` or ``rotating``.
-    `notes`: what was chosen by type is added. Result: a topic that is not there keeps the project's name.
+    Parameters
+    ----------
+    path : Path
+        For the messages to the user.
+    is_phase : callable
+        Whether a diagnostic message says ``dwell`` or ``rotating``.
+    notes : list of str
+        What was chosen by type is added.
+
+    Returns
+    -------
+    Topics
+        A topic that is not there keeps the project's name.
     """
     for kind in KINDS:
         asked = getattr(choice, kind)

@@ -26,7 +26,13 @@ def allowed(path: Path) -> int:
 
 
 class Allowance:
-    """What may still come out of a file, block by block. `most`: bytes."""
+    """What may still come out of a file, block by block.
+
+    Parameters
+    ----------
+    most : int
+        Bytes.
+    """
 
     def __init__(self, most: int) -> None:
         self._most = self._left = most
@@ -34,7 +40,10 @@ class Allowance:
     def unpack(self, compression: str, data: bytes, size: int | None = None) -> bytes:
         """Unpack a block as `unpacked` does; `size` (bytes) is what it says itself.
 
-        Raises UnpackError as there, and when all blocks together come to more than is allowed.
+        Raises
+        ------
+        UnpackError
+            As there, and when all blocks together come to more than is allowed.
         """
         if size is not None and size > self._left:
             raise UnpackError(f"the file unpacks to more than {self._most} bytes")
@@ -46,8 +55,17 @@ class Allowance:
 def unpacked(compression: str, data: bytes, most: int) -> bytes:
     """Unpack data.
 
-    `compression`: ``zstd``, ``lz4`` (frames), or nothing. `most`: bytes that may come out. Raises UnpackError when they
-    are damaged, unpack to more than `most` bytes, or the compression is unknown.
+    Parameters
+    ----------
+    compression : str
+        ``zstd``, ``lz4`` (frames), or nothing.
+    most : int
+        Bytes that may come out.
+
+    Raises
+    ------
+    UnpackError
+        When they are damaged, unpack to more than `most` bytes, or the compression is unknown.
     """
     if compression == "zstd":
         return _zstd(data, most)
@@ -97,7 +115,13 @@ def _within(data: bytes, most: int) -> bytes:
 
 
 def unpack_file(path: Path, target: Path) -> None:
-    """Unpack a file of zstd into another one. Raises UnpackError when it is damaged, or unpacks to more than it may."""
+    """Unpack a file of zstd into another one.
+
+    Raises
+    ------
+    UnpackError
+        When it is damaged, or unpacks to more than it may.
+    """
     left = allowed(path)
     try:
         with path.open("rb") as packed, target.open("wb") as plain:

@@ -20,9 +20,12 @@ FORMAT = "sdimu-datasheet/1"
 class Certificate:
     """Who vouches for what; empty where nobody said it.
 
-    `serial`, `date`, `operator`, `plan`, `version`: unit, day of the certificate, person, test plan, version of the
-    program. `recordings`: name and SHA-256 of each file of the recordings; the second is empty where the file was not
-    found.
+    Attributes
+    ----------
+    serial, date, operator, plan, version : str
+        Unit, day of the certificate, person, test plan, version of the program.
+    recordings : tuple of (str, str)
+        Name and SHA-256 of each file of the recordings; the second is empty where the file was not found.
     """
 
     serial: str = ""
@@ -36,7 +39,12 @@ class Certificate:
 def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entries: Sequence[Entry]) -> None:
     """Write datasheet.json: SI numbers, ``null`` for what was not measured.
 
-    `path`: file to make or replace; its folder is made too. `entries`: the results that it is made of.
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    entries : sequence of Entry
+        The results that it is made of.
     """
     write_json(
         path,
@@ -57,8 +65,12 @@ def _line(line: Line) -> dict[str, Any]:
 def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, str], ...]:
     """Hash the files of the recordings of some results.
 
-    `entries`: a recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it. `given`:
-    recordings that are elsewhere.
+    Parameters
+    ----------
+    entries : sequence of Entry
+        A recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it.
+    given : sequence of Path
+        Recordings that are elsewhere.
     """
     for path in given:
         if not path.exists():

@@ -26,7 +26,15 @@ FORMAT = "sdimu-fleet/1"
 
 
 def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
-    """Write fleet.json. `path`: file to make or replace; its folder is made too. `done`: what they say together."""
+    """Write fleet.json.
+
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    done : Study
+        What they say together.
+    """
     first = gathered.entries[0].result
     shown = dict(zip(first.names, zip(first.units, first.display_units, strict=True), strict=True))
     write_json(
@@ -71,8 +79,17 @@ def _spread(name: str, found: RandomEffect) -> dict[str, float]:
 def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapping[str, str]:
     """Write an IMU file with the priors of the population, without units that are out.
 
-    `path`: file to make or replace. `base`: IMU by name or path: grade, noise, and priors of effects that the
-    population does not know. Result: the priors written, as in the file, by effect.
+    Parameters
+    ----------
+    path : Path
+        File to make or replace.
+    base : str
+        IMU by name or path: grade, noise, and priors of effects that the population does not know.
+
+    Returns
+    -------
+    mapping of str to str
+        The priors written, as in the file, by effect.
     """
     source = find_config("imu", base)
     if same_file(path, source):

@@ -34,8 +34,14 @@ Diagnosis = DiagnosisFile | SetDiagnosisFile
 class Entry:
     """A result of a folder.
 
-    `name`: folder of the result, as seen from the folder that was asked for. `path`: its folder. `diagnosis`: content
-    of diagnosis.json or set.json beside it.
+    Attributes
+    ----------
+    name : str
+        Folder of the result, as seen from the folder that was asked for.
+    path : Path
+        Its folder.
+    diagnosis : DiagnosisFile or SetDiagnosisFile or None
+        Content of diagnosis.json or set.json beside it.
     """
 
     name: str
@@ -58,9 +64,14 @@ class Entry:
 class Gathered:
     """What a folder holds.
 
-    `entries`: of the type that most results are of, in the order of their dates. `apart`: one line for every result
-    that does not fit. `given`: results with diagnosis.json, of the IMU and body frame of `entries`, one a recording,
-    whatever was found.
+    Attributes
+    ----------
+    entries : tuple of Entry
+        Of the type that most results are of, in the order of their dates.
+    apart : tuple of str
+        One line for every result that does not fit.
+    given : tuple of Entry
+        Results with diagnosis.json, of the IMU and body frame of `entries`, one a recording, whatever was found.
     """
 
     entries: tuple[Entry, ...]
@@ -71,8 +82,12 @@ class Gathered:
 def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
     """Find every result.json below some folders, and take those that fit together.
 
-    `folders`: folders, or result.json files. `one_model`: set results of other models apart, not those of other IMU
-    files and body frames alone.
+    Parameters
+    ----------
+    folders : sequence of Path
+        Folders, or result.json files.
+    one_model : bool
+        Set results of other models apart, not those of other IMU files and body frames alone.
     """
     apart: list[str] = []
     usable = [entry for name, path in _found(folders) if (entry := _read(name, path, apart)) is not None]

@@ -64,7 +64,12 @@ def write_measured_imu(
 def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:
     """Sizes (SI) of the terms beside white noise that a triad shows, root mean square of its axes.
 
-    `terms`: by channel. `triad`: ``gyro`` or ``accel``.
+    Parameters
+    ----------
+    terms : mapping of str to Terms
+        By channel.
+    triad : str
+        ``gyro`` or ``accel``.
     """
     axes = [t for channel, t in terms.items() if channel.startswith(triad)]
     out = {}

@@ -19,7 +19,18 @@ class _LimitsFile(Schema):
 
 
 def read_limits(path: Path, terms: Mapping[str, str]) -> dict[str, float]:
-    """Read limits. `terms`: unit of each term that a data sheet knows. Result: largest size allowed (SI) by term."""
+    """Read limits.
+
+    Parameters
+    ----------
+    terms : mapping of str to str
+        Unit of each term that a data sheet knows.
+
+    Returns
+    -------
+    dict of str to float
+        Largest size allowed (SI) by term.
+    """
     if not path.is_file():
         raise DataError(f"{path}: no such file of limits")
     out = {}

@@ -28,8 +28,14 @@ def named_estimator(word: str, option: str = "estimator") -> str:
 def named_model(word: str | None, added: Sequence[str], handheld: bool = False) -> Model:
     """Read the model that `word` means, with effects added; ``handheld`` means ``hand``.
 
-    `word`: name in config/model or path; None takes the model for a table, or for a handheld run. `added`: effects to
-    add. `handheld`: moved by hand.
+    Parameters
+    ----------
+    word : str or None
+        Name in config/model or path; None takes the model for a table, or for a handheld run.
+    added : sequence of str
+        Effects to add.
+    handheld : bool
+        Moved by hand.
     """
     default = HANDHELD_MODEL if handheld else TABLE_MODEL
     return extended_model(default if word is None else _MODEL_ALIASES.get(word, word), added)

@@ -44,8 +44,16 @@ class NoiseTermsFile(ResultModel):
 def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapping[str, Terms]) -> None:
     """Write noise.json.
 
-    `path`: file to make or replace. `recording`: name of the bag. `duration_s`: length of all rests (s). `terms`: by
-    channel.
+    Parameters
+    ----------
+    path : Path
+        File to make or replace.
+    recording : str
+        Name of the bag.
+    duration_s : float
+        Length of all rests (s).
+    terms : mapping of str to Terms
+        By channel.
     """
     NoiseTermsFile.model_construct(
         format=FORMAT,

@@ -28,8 +28,17 @@ _RESPONSES = frozenset((*ACCEL_MISALIGNMENT.labels, *GYRO_MASS_UNBALANCE.labels,
 def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -> dict[str, float]:
     """Read published one-sigma errors.
 
-    `name_or_path`: name in config/reference/ or path. `mount`: which column: misalignment between IMU and table.
-    Result: sigma (SI) by effect name.
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name in config/reference/ or path.
+    mount : str
+        Which column: misalignment between IMU and table.
+
+    Returns
+    -------
+    dict of str to float
+        Sigma (SI) by effect name.
     """
     path = find_config("reference", name_or_path)
     columns = _columns(path)
@@ -57,9 +66,19 @@ def _columns(path: Path) -> Mapping[str, Any]:
 def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dict[str, float]:
     """Read the true coefficients of a simulation, as they are in a body frame.
 
-    `path`: file that the simulator wrote beside the bag. `body_frame`: ``accelerometer_triad`` or ``prior``. `gravity`:
-    gravity that a result took by convention (m/s^2): the truth is stated as it is for one who takes that. Result: True
-    value (SI) by coefficient name.
+    Parameters
+    ----------
+    path : Path
+        File that the simulator wrote beside the bag.
+    body_frame : str
+        ``accelerometer_triad`` or ``prior``.
+    gravity : float, optional
+        Gravity that a result took by convention (m/s^2): the truth is stated as it is for one who takes that.
+
+    Returns
+    -------
+    dict of str to float
+        True value (SI) by coefficient name.
     """
     path = Path(path)
     if not path.is_file():

@@ -150,8 +150,12 @@ class ResultFile(ResultModel):
 def write_result(path: Path, calibration: Calibration, verdict: Verdict | None = None) -> None:
     """Write result.json: SI numbers, ``null`` for what is not a finite number.
 
-    `path`: file to make or replace; its folder is made too. `verdict`: of a diagnosis, where one was made; no note then
-    advises one.
+    Parameters
+    ----------
+    path : Path
+        File to make or replace; its folder is made too.
+    verdict : Verdict, optional
+        Of a diagnosis, where one was made; no note then advises one.
     """
     c, told = calibration, without_advice if verdict else tuple
     seldom: dict[str, Any] = {
@@ -206,7 +210,10 @@ def read_result(path: Path) -> Calibration:
 def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
     """Read result.json, and why it is not to be trusted, for those who go on to use it.
 
-    `path`: file, or a folder with a result.json.
+    Parameters
+    ----------
+    path : Path
+        File, or a folder with a result.json.
 
     Returns
     -------
@@ -286,7 +293,10 @@ def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, s
     A result that does not hold it (of an older version, or of others) has that of the file in config/imu that it names,
     or of a usual IMU: a run by hand is one of a cheap sensor, and a table gyro would say thousands of times less noise.
 
-    `imu`: name or path of an IMU file; None or empty where nobody names one.
+    Parameters
+    ----------
+    imu : str or None
+        Name or path of an IMU file; None or empty where nobody names one.
 
     Returns
     -------

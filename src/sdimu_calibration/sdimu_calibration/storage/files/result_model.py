@@ -103,8 +103,12 @@ class Entry:
 
     Words are read on one line; ``null`` is the default of the field, or NaN; an array that is missing is empty.
 
-    `also`: what is written beside the fields, from the object; passed over when the file is read. `seldom`: fields that
-    are written only where they hold something.
+    Attributes
+    ----------
+    also : mapping of str to callable
+        What is written beside the fields, from the object; passed over when the file is read.
+    seldom : tuple of str
+        Fields that are written only where they hold something.
     """
 
     also: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict, hash=False)

@@ -54,7 +54,10 @@ def put_aside(path: Path) -> Path | None:
 def write_whole(path: Path, text: str) -> None:
     """Write a text file beside its place and rename it: a reader never meets half of it; its folder is made too.
 
-    `path`: file to make or replace.
+    Parameters
+    ----------
+    path : Path
+        File to make or replace.
     """
     path = Path(path)
     if path.is_dir():
@@ -78,8 +81,10 @@ def written_together(folder: Path) -> Iterator[Path]:
 
     Two runs into one folder leave the files of the one or of the other, never some of each.
 
-    `folder`: made when it is not there. Files of other names stay; with a new result the `COMPANIONS` of the old one
-    go.
+    Parameters
+    ----------
+    folder : Path
+        Made when it is not there. Files of other names stay; with a new result the `COMPANIONS` of the old one go.
 
     Yields
     ------

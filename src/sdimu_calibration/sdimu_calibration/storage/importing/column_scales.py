@@ -24,7 +24,14 @@ _NEAR = 0.15
 class Scale(NamedTuple):
     """How numbers become SI.
 
-    `counts`: numbers of one unit. `bias`: number of zero. `why`: by what it was recognised.
+    Attributes
+    ----------
+    counts : float
+        Numbers of one unit.
+    bias : float
+        Number of zero.
+    why : str
+        By what it was recognised.
     """
 
     unit: str

@@ -44,8 +44,14 @@ class Pair(NamedTuple):
 class TimeColumn(NamedTuple):
     """The clock of a file.
 
-    `column`: heading or number; empty where there is none. `rate_hz`: 0 where nothing says it. `why`: how it was
-    recognised.
+    Attributes
+    ----------
+    column : str
+        Heading or number; empty where there is none.
+    rate_hz : float
+        0 where nothing says it.
+    why : str
+        How it was recognised.
     """
 
     column: str

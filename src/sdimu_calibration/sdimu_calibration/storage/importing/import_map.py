@@ -99,9 +99,16 @@ class SensorMap(Schema):
 
     A unit of angle, or of velocity, means increments over the interval of the samples.
 
-    `columns`: three, or one variable with three columns. `file`: pattern of the name of the file that holds them;
-    needed when several files are given. `time`: column of the times, where it is not the common one. `counts_per_unit`,
-    `bias`: raw counts; the bias is the nominal one, such as half of the converter's range.
+    Attributes
+    ----------
+    columns : tuple of int or str
+        Three, or one variable with three columns.
+    file : str, optional
+        Pattern of the name of the file that holds them; needed when several files are given.
+    time : int or str, optional
+        Column of the times, where it is not the common one.
+    counts_per_unit, bias : tuple of three float
+        Raw counts; the bias is the nominal one, such as half of the converter's range.
     """
 
     columns: Annotated[tuple[Column, ...], BeforeValidator(_listed)]
@@ -166,8 +173,14 @@ def _each(value: Any) -> list[Any]:
 class PhaseMap(Schema):
     """Which rows are at rest.
 
-    `column`: holds a word or a number. `rest`: what it says at rest; ``*`` stands for anything (``pos*``). Another word
-    of them begins another rest. `file`: as of a sensor.
+    Attributes
+    ----------
+    column : int or str
+        Holds a word or a number.
+    rest : tuple of str
+        What it says at rest; ``*`` stands for anything (``pos*``). Another word of them begins another rest.
+    file : str, optional
+        As of a sensor.
     """
 
     column: Column
@@ -178,7 +191,12 @@ class PhaseMap(Schema):
 class BinaryMap(Schema):
     """Numbers of one kind in a file, row after row, without anything else.
 
-    `columns`: numbers of a row. `skip_bytes`: before the first number.
+    Attributes
+    ----------
+    columns : int
+        Numbers of a row.
+    skip_bytes : int
+        Before the first number.
     """
 
     type: Literal["float64", "float32", "int64", "int32", "int16"]
@@ -190,9 +208,16 @@ class BinaryMap(Schema):
 class ImportMap(Schema):
     """What the columns of the files are.
 
-    `delimiter`: between the columns of a text file; recognised when left out. `decimal`: decimal sign of a text file.
-    `skip_lines`: lines before the data of a text file, the last of them with the headings; recognised when left out.
-    `binary`: of files that are neither text nor MAT nor NPZ.
+    Attributes
+    ----------
+    delimiter : str, optional
+        Between the columns of a text file; recognised when left out.
+    decimal : str
+        Decimal sign of a text file.
+    skip_lines : int, optional
+        Lines before the data of a text file, the last of them with the headings; recognised when left out.
+    binary : BinaryMap, optional
+        Of files that are neither text nor MAT nor NPZ.
     """
 
     format: Literal["sdimu-import/1"]

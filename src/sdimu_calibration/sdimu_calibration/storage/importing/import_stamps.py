@@ -33,7 +33,12 @@ _LARGEST_NS = 4e18
 def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: int) -> tuple[Stamps, tuple[str, ...]]:
     """Read the stamps of a table.
 
-    `column`: None makes them from the rate. `samples`: how many there must be.
+    Parameters
+    ----------
+    column : int or str or None
+        None makes them from the rate.
+    samples : int
+        How many there must be.
 
     Returns
     -------

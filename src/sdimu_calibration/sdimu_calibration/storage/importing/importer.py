@@ -58,8 +58,11 @@ class Imported:
 def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
     """Read the files that a map describes.
 
-    `paths`: CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the
-    map names, or, where it names none, one stretch of time each, in this order.
+    Parameters
+    ----------
+    paths : sequence of Path
+        CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
+        names, or, where it names none, one stretch of time each, in this order.
     """
     named = (
         chart.accel.file,
@@ -136,7 +139,12 @@ def _one_status(parts: Sequence[Status]) -> Status | None:
 def write_imported(path: Path, found: Imported, replace: bool = False, custom: Mapping[str, str] | None = None) -> None:
     """Write imported samples to a rosbag2 folder.
 
-    `replace`: replace a bag that is there. `custom`: what the user says of the unit: ``serial``, ``power_on``.
+    Parameters
+    ----------
+    replace : bool
+        Replace a bag that is there.
+    custom : mapping of str to str, optional
+        What the user says of the unit: ``serial``, ``power_on``.
     """
     write_recording(
         path,
@@ -236,12 +244,15 @@ _SHOWN = 8
 def read_phase(table: Table, part: PhaseMap, ns: Stamps) -> Status:
     """Read the changes between rest and motion.
 
-    Result: a rest begins with the interval of its first row: at the stamp of the row before.
-
     Parameters
     ----------
     ns : ndarray of int64, shape (n,)
         Stamps of the rows (ns).
+
+    Returns
+    -------
+    Status
+        A rest begins with the interval of its first row: at the stamp of the row before.
     """
     labels = _labels(table, part.column)
     if len(labels) != len(ns):

@@ -22,8 +22,12 @@ _UNKNOWN_HZ = 100.0
 class Proposal:
     """A map.
 
-    `suffix`: for the names of its file and of the bag; empty where a file holds one IMU. `words`: what was recognised
-    by what, and what is left to the user.
+    Attributes
+    ----------
+    suffix : str
+        For the names of its file and of the bag; empty where a file holds one IMU.
+    words : tuple of str
+        What was recognised by what, and what is left to the user.
     """
 
     suffix: str
@@ -32,7 +36,13 @@ class Proposal:
 
 
 def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
-    """Propose a map for each IMU in a file. `paths`: files of one form; the first one is looked at."""
+    """Propose a map for each IMU in a file.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of one form; the first one is looked at.
+    """
     path = Path(paths[0])
     check_file(path)
     if path.suffix.lower() == ".npz":

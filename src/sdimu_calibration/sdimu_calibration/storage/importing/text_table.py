@@ -46,10 +46,20 @@ def check_file(path: Path) -> None:
 class TextTable:
     """Columns of a text file, found by number (from 1) or by heading.
 
-    `notes`: what was recognised and may be wrong. `delimiter`: recognised from the first line of data when left out.
-    `decimal`: ``.`` or ``,``. `skip_lines`: lines before the data; recognised when left out: blank, comment, mostly not
-    numbers, of another number of columns than most, or real numbers where the data are integers (and the other way
-    round).
+    Attributes
+    ----------
+    notes : tuple of str
+        What was recognised and may be wrong.
+
+    Parameters
+    ----------
+    delimiter : str, optional
+        Recognised from the first line of data when left out.
+    decimal : str
+        ``.`` or ``,``.
+    skip_lines : int, optional
+        Lines before the data; recognised when left out: blank, comment, mostly not numbers, of another number of
+        columns than most, or real numbers where the data are integers (and the other way round).
     """
 
     def __init__(
@@ -91,7 +101,10 @@ class TextTable:
     def leave_out_broken(self, as_nan: bool = False) -> bool:
         """Leave out lines that a serial link or a full disk broke, while they are few; whether there were any.
 
-        `as_nan`: where the lines are the clock: they count as samples without numbers.
+        Parameters
+        ----------
+        as_nan : bool
+            Where the lines are the clock: they count as samples without numbers.
         """
         rows = [k for k in range(self._begin, len(self._lines)) if not _skipped(self._lines[k])]
         sample = [self._cells(self._lines[k]) for k in _spread(rows)]
