@@ -17,10 +17,10 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
-from sdimu_sim.core.faults import FAULTS, Fault
 from sdimu_sim.core.generator import simulate_imu
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth
+from sdimu_study.fault_kinds import FAULTS, Fault
 from sdimu_study.study import Row, Study, Table, head
 from sdimu_study.worlds import motion_of, true_values
 

@@ -14,7 +14,7 @@ from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.storage.files.config import load_model
-from sdimu_sim.core.hidden import size_unit
+from sdimu_sim.core.hidden import parse_effects, size_unit
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import TemperatureProfile
 from sdimu_sim.core.true_coefficients import POWERS, accelerometer_frames
@@ -141,7 +141,7 @@ def in_the_frame(scenario: Scenario) -> tuple[Floats, Floats]:
         raise DataError("the scenario has no temperature")
     perfect = simulate(scenario, ImuTruth(mount_rad=sensor.mount_rad))
     t = perfect.t - 0.5 * perfect.interval_s
-    frames = accelerometer_frames(sensor, _GRID_K)
+    frames = accelerometer_frames(sensor.coefficients, parse_effects(sensor.effects).sizes, _GRID_K)
     middle = len(_GRID_K) // 2
     turns = np.array([rotation_vector(R @ frames[middle].T) for R in frames])
     # The frame follows the thermometer: what the axes lag behind it is an error of the sensors.

@@ -20,8 +20,10 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model, Site
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_sim.core.hidden import parse_effects
 from sdimu_sim.core.scenario import Scenario
-from sdimu_sim.core.true_coefficients import POWERS, RATES, SEEN_OF_TURNS, with_lag
+from sdimu_sim.core.true_coefficients import POWERS, SEEN_OF_TURNS, true_coefficients
+from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.noise import drawn_noise
 from sdimu_study.plans import FILED
 from sdimu_study.set_world import Unit, here, members_of, opened
@@ -33,6 +35,8 @@ from sdimu_study.worlds import place_told, rng_of
 LAG = "soaks-lag"
 SOAK_KINDS = ("soaks", LAG, "soaks-flicker", "soaks-markov")
 """Questions of the study: white noise, a lag of the sensors, noise with a memory."""
+RATES = ("temperature_rate", "temperature_rate_linear")
+"""Rates of the first powers of the temperature, as they stand in the names of effects."""
 ORDERS = 2
 """Highest power of the temperature."""
 _LATITUDES_DEG = (-50.0, 60.0)
@@ -222,3 +226,32 @@ def _ratio(rows: Rows, key: str) -> str:
         return ""
     both = [(word, np.array([row[key][word] for row in rows])) for word in ("gyro", "accel")]
     return "; ".join(f"{word} {np.median(v):.2f} ({v.max():.2f})" for word, v in both)
+
+
+def with_lag(truth: ImuTruth, frame: str, lag_s: float) -> dict[str, float]:
+    """State sensors that lag behind their thermometer by what a calibration without a lag finds.
+
+    To first order of the lag L, ``k1 (T - L dT/dt - T0) + k2 (T - L dT/dt - T0)^2`` is the polynomial and rate terms
+    ``-k1 L dT/dt`` and ``-2 k2 L (T - T0) dT/dt``. The frame is that of accelerometers without the lag, so rate terms
+    of axes are those as built.
+
+    Parameters
+    ----------
+    frame : str
+        ``prior`` or ``accelerometer_triad``.
+    lag_s : float
+        s.
+
+    Returns
+    -------
+    dict of str to float
+        As `true_coefficients` (SI).
+    """
+    out = true_coefficients(truth, frame)
+    for name, size in parse_effects(truth.effects).sizes.items():
+        stem, _, part = name.rpartition("_")
+        for times, (power, rate) in enumerate(zip(POWERS, RATES, strict=False), start=1):
+            if stem.endswith(f"_{power}"):
+                late = f"{stem.removesuffix(power)}{rate}_{part}"
+                out[late] = out.get(late, 0.0) - times * lag_s * size
+    return out

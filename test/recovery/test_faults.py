@@ -11,8 +11,8 @@ from sdimu_calibration.core.data.arrival import arrange
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
-from sdimu_sim.core.faults import FAULTS, Fault
 from sdimu_sim.core.scenario import Scenario
+from sdimu_study.fault_kinds import FAULTS, Fault
 from sdimu_study.faults import (
     NOTED,
     OK,

@@ -22,8 +22,8 @@ from sdimu_calibration.core.compensation import compensate, compensator
 from sdimu_calibration.core.effects import imu_model, registry
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
-from sdimu_calibration.nodes.convert import encode_imu
 from sdimu_calibration.nodes.credits import STREAM, header, to_ns
+from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.result_file import write_result
 
@@ -117,7 +117,7 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Fi
     n = 90
     omega, force = rng.standard_normal((n, 3)), 10.0 * rng.standard_normal((n, 3))
     stamps = START_NS + INTERVAL_NS * np.arange(1, n + 1)
-    messages = encode_imu(stamps, omega, force, "imu_link", 0.0, 0.0)
+    messages = encode_imu(stamps, omega, force, "imu_link")
 
     def send(rows: range) -> None:
         for k in rows:
@@ -170,7 +170,7 @@ def test_the_node_follows_the_temperature_by_its_polynomial(bench: FitSession, r
     n, degc = 20, (-20.0, -16.0)
     omega, force = rng.standard_normal((n, 3)), 10.0 * rng.standard_normal((n, 3))
     stamps = START_NS + INTERVAL_NS * np.arange(1, n + 1)
-    messages = encode_imu(stamps, omega, force, "imu_link", 0.0, 0.0)
+    messages = encode_imu(stamps, omega, force, "imu_link")
     rig.spin_until(lambda: rig.raw.get_subscription_count() > 0, "the node listens")
     rig.spin_until(lambda: rig.heat.get_subscription_count() > 0, "the node listens to the temperature")
     rig.spin_until(lambda: rig.node.count_publishers("/imu/data") > 0, "the node offers")

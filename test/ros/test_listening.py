@@ -15,10 +15,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from sensor_msgs.msg import Imu
 
-from sdimu_calibration.nodes.convert import encode_imu, stamp_of
+from sdimu_calibration.nodes.convert import stamp_of
 from sdimu_calibration.nodes.credits import STREAM
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.ticking import Ticker
+from sdimu_calibration.storage.bags.cdr import encode_imu
 
 from .conftest import FitSession
 
@@ -60,7 +61,7 @@ def test_both_reliabilities_are_heard(pair: Pair, offered: QoSProfile) -> None:
     publisher = pair.node.create_publisher(Imu, "/imu/data_raw", offered)
     stamps = np.arange(1, 1000) * 10_000_000
     zeros = np.zeros((len(stamps), 3))
-    messages = encode_imu(stamps, zeros, zeros, "imu", 0.0, 0.0)
+    messages = encode_imu(stamps, zeros, zeros, "imu")
     begun = time.monotonic()
     for message in messages:
         publisher.publish(message)

@@ -12,11 +12,11 @@ from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_sim.core.hidden import size_unit
-from sdimu_sim.core.true_coefficients import POWERS, RATES, SEEN_OF_TURNS, true_coefficients, with_lag
+from sdimu_sim.core.true_coefficients import POWERS, SEEN_OF_TURNS, true_coefficients
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.set_world import here, members_of, opened
 from sdimu_study.soak_world import T0_DEGC, in_the_frame, noise_of, ramp
-from sdimu_study.soaks import SOAK_KINDS, STUDY, drawn, errors, model_of, of_power_on, ratios, tables
+from sdimu_study.soaks import RATES, SOAK_KINDS, STUDY, drawn, errors, model_of, of_power_on, ratios, tables, with_lag
 
 SEED = 3
 

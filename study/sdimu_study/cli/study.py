@@ -145,8 +145,8 @@ def faults(
     from sdimu_calibration.core.recording import DataError
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
     from sdimu_calibration.storage.files.json_file import write_json
-    from sdimu_sim.core.faults import FAULTS
     from sdimu_sim.core.scenario import Scenario
+    from sdimu_study.fault_kinds import FAULTS
     from sdimu_study.faults import TRACEBACK, WRONG, content, fault_study, hurried, page, table, totals
     from sdimu_study.study import Table
 

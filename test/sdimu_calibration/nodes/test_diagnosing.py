@@ -10,9 +10,8 @@ def test_the_death_of_the_worker_is_told_once(monkeypatch):
     def answer():
         raise DataError("the process has ended")
 
-    stops = SimpleNamespace(answer=answer, close=lambda: None)
-    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.Worker", lambda _: None)
-    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.StopDiagnosis", lambda *_: stops)
+    worker = SimpleNamespace(answer=answer, close=lambda: None)
+    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.Worker", lambda _: worker)
     told = []
     node = SimpleNamespace(create_publisher=lambda *_: None)
     diagnosing = Diagnosing(node, SimpleNamespace(report=None), (), told.append)

@@ -27,7 +27,7 @@ from sdimu_calibration.report import (
     sections,
     use_section,
 )
-from sdimu_calibration.report.export import as_csv, as_yaml
+from sdimu_calibration.report.coefficients import as_csv, as_yaml
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras

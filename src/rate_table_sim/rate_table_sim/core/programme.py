@@ -57,18 +57,8 @@ class PlanProgramme:
         """Take the next `count` samples."""
         here = slice(self._next, self._next + count)
         self._next += count
-        m = self._motion
-        return TableMotion(
-            m.t[here],
-            m.angle[here],
-            m.rate[here],
-            m.encoder_angle[here],
-            m.stop[here],
-            m.dwell[here],
-            m.q_nt[here],
-            m.omega_nt_t[here],
-            m.names,
-        )
+        arrays = {name: values[here] for name, values in vars(self._motion).items() if name != "names"}
+        return replace(self._motion, **arrays)
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,7 @@ def compensate(
     """
     from sdimu_calibration.core.compensation import compensator
     from sdimu_calibration.storage.bags.bag_reader import read_recording
-    from sdimu_calibration.storage.bags.compensated_bag import write_compensated
-    from sdimu_calibration.storage.bags.compensated_imu import frame_of
+    from sdimu_calibration.storage.bags.compensated_bag import frame_of, write_compensated
     from sdimu_calibration.storage.files.effect_file import effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 

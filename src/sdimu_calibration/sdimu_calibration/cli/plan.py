@@ -141,7 +141,7 @@ def plan(
     if more and not request.after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
     paths = [*(request.after or []), *(more or [])]
-    before = standing_of(console, After(paths, planned.imu, planned.site, planned.model)) if request.after else None
+    before = standing_of(console, paths, planned) if request.after else None
     imu = planned.imu or (before and before.imu) or "dtg"
     site = planned.site or (before and before.site) or "daejeon"
     wanted = named_model(planned.model, [*(before.added if before else ()), *(planned.add or [])])
@@ -297,40 +297,22 @@ def _numbers(option: str, text: str, most: float) -> list[float]:
     return values
 
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from sdimu_calibration.core.evidence.known import Standing
-    from sdimu_calibration.core.plan import Plan
-    from sdimu_calibration.core.plan_search import Bounds, Found
-
-
-@dataclass(frozen=True)
-class After:
-    """What stands in the options of `sdimu plan`; entries as the options of the same names."""
-
-    paths: Sequence[Path]
-    imu: str | None
-    site: str | None
-    model: str
-
-
-def standing_of(console: Console, asked: After) -> Standing:
+def standing_of(console: Console, paths: Sequence[Path], asked: Planned) -> Standing:
     """Read what results know; recordings are diagnosed first, several as one set."""
     from sdimu_calibration.storage.files.standing_file import holds_standing, read_standing, standing_of_result
 
-    results = [p for p in asked.paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
-    if results and len(asked.paths) > 1:
+    results = [p for p in paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
+    if results and len(paths) > 1:
         raise DataError(
             f"--after {results[0]}: results stand alone, as two of them may count a recording twice; name the bags, "
             "which are then diagnosed together"
         )
     if results:
         return read_standing(results[0]) if holds_standing(results[0]) else standing_of_result(results[0], asked.imu)
-    return _diagnosed(console, asked)
+    return _diagnosed(console, paths, asked)
 
 
-def _diagnosed(console: Console, asked: After) -> Standing:
+def _diagnosed(console: Console, paths: Sequence[Path], asked: Planned) -> Standing:
     from sdimu_calibration.cli.options import FitRequest, StatedOpening
     from sdimu_calibration.cli.set_run import SetRequest, diagnosed_set
     from sdimu_calibration.core.diagnosis.diagnose import climb
@@ -341,12 +323,12 @@ def _diagnosed(console: Console, asked: After) -> Standing:
     from sdimu_calibration.storage.files.model_choice import named_model
     from sdimu_calibration.storage.opening import open_test
 
-    if len(asked.paths) > 1:
-        request = SetRequest(asked.paths, StatedOpening(asked.site, asked.imu), FitRequest(asked.model))
+    if len(paths) > 1:
+        request = SetRequest(paths, StatedOpening(asked.site, asked.imu), FitRequest(asked.model))
         found = diagnosed_set(console, request, ())[0]
         say(console, f"{found.verdict}: {found.sentence}")
         return found.standing
-    test = open_test(asked.paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
+    test = open_test(paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))
     with bar(console) as progress:
         one = summarise(climb(solve(test, named_model(asked.model, ()), progress=progress), progress=progress))
     say(console, f"{one.diagnosis.verdict}: {one.diagnosis.sentence}")

@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -127,18 +127,11 @@ def is_held(domain: int) -> bool:
 
 def _told(path: Path, domain: int) -> RunningTest | None:
     """Read what a run tells of its test; None where it tells nothing, such as a test of the nodes alone."""
+    from pydantic import TypeAdapter
+
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        return RunningTest(
-            str(told["folder"]),
-            float(told["duration_s"]),
-            int(told["stops"]),
-            str(told["model"]),
-            str(told["imu"]),
-            int(told["start_ns"]),
-            domain,
-        )
-    except (OSError, ValueError, TypeError, KeyError):
+        return replace(TypeAdapter(RunningTest).validate_json(path.read_bytes()), domain=domain)
+    except (OSError, ValueError):
         return None
 
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.report.live_seen import Outline, Seen, left_words, place_words, time_words
+from sdimu_calibration.report.live_seen import Outline, Progress, left_words, place_words, time_words
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.text import Text
 
 
 class Watch:
@@ -41,7 +42,7 @@ class Watch:
         if self._live:
             self._live.stop()
 
-    def show(self, seen: Seen, streaming: bool, wall_s: float) -> None:
+    def show(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Show where the test is.
 
         Parameters
@@ -66,7 +67,7 @@ class Watch:
     def _print(self, line: str) -> None:
         self._console.print(line, soft_wrap=True, markup=False, highlight=False)
 
-    def line(self, seen: Seen, wall_s: float) -> str:
+    def line(self, seen: Progress, wall_s: float) -> str:
         """Return the whole of it in one line."""
         parts = [
             place_words(self._test, seen),
@@ -76,7 +77,7 @@ class Watch:
         ]
         return "; ".join(part for part in parts if part)
 
-    def picture(self, seen: Seen, streaming: bool, wall_s: float) -> RenderableType:
+    def picture(self, seen: Progress, streaming: bool, wall_s: float) -> RenderableType:
         """Return what the terminal shows."""
         from rich.console import Group
         from rich.progress_bar import ProgressBar
@@ -98,7 +99,7 @@ class Watch:
         lamp = Text(light(seen.nis, seen.verdict), style="green" if fine else "bold yellow")
         return Group(head, lamp, sigmas, picture(seen.diagnosis))
 
-    def _falling(self, seen: Seen) -> list[Falling]:
+    def _falling(self, seen: Progress) -> list[Falling]:
         return falling(seen.first, seen.sigmas, self._test.units, self._test.effects)
 
 
@@ -114,10 +115,6 @@ def _gauge(f: Falling) -> str:
     full = round(_GAUGE * left)
     return "\N{FULL BLOCK}" * full + "\N{LIGHT SHADE}" * (_GAUGE - full)
 
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.text import Text
 
 _NOTABLE = 3.0
 """Sigmas from which a cell has a number."""

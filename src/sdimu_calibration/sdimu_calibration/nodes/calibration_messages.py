@@ -17,7 +17,7 @@ from sdimu_calibration.core.rotation import quaternion_matrix
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.credits import header
-from sdimu_calibration.storage.bags.compensated_imu import frame_of
+from sdimu_calibration.storage.bags.compensated_bag import frame_of
 
 
 def coefficients(

@@ -34,7 +34,7 @@ from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.bags.cdr import LayoutError, Stamps, decode_imu
-from sdimu_calibration.storage.bags.compensated_imu import encode_compensated, frame_of
+from sdimu_calibration.storage.bags.compensated_bag import encode_compensated, frame_of
 from sdimu_calibration.storage.files.effect_file import effects_of_result
 from sdimu_calibration.storage.files.result_file import noise_for, read_result
 

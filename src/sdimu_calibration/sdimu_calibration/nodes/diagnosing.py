@@ -18,14 +18,14 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job
-from sdimu_calibration.nodes.live_diagnosis import StopDiagnosis, Worker
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, WorkerRequest
+from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.nodes.live_report import DIAGNOSIS, REPORT
 from sdimu_calibration.report.live_text import diagnosis_line
 
 
 class Diagnosing:
-    """Diagnoses a running test.
+    """Diagnoses a running test: at the end of each stop, and again when the model has changed.
 
     Parameters
     ----------
@@ -35,18 +35,15 @@ class Diagnosing:
         Effects beyond the model that the test begins with.
     warn : callable
         Tells the user that there will be no more diagnoses, and why.
-
-    Attributes
-    ----------
-    last : Answer or None
-        The newest diagnosis, with the answer to the question of the job.
     """
 
     def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:
         self._node, self._warn = node, warn
-        self._stops = StopDiagnosis(Worker(job), added) if job else None
+        self._worker = Worker(job) if job else None
         self._report = job.report if job else None
-        self.last: Answer | None = None
+        self._models = [added]
+        self._stop, self._rest_ns = 0, 0
+        self._last: tuple[int, int | None] | None = None
         # Few and telling: who comes late gets them all.
         self._diagnosis = node.create_publisher(DiagnosticArray, "calibration/diagnosis", HISTORY)
         self._ranking = node.create_publisher(JointState, "calibration/ranking", HISTORY)
@@ -56,17 +53,20 @@ class Diagnosing:
     @property
     def idle(self) -> bool:
         """Whether nothing is asked that is not answered."""
-        return self._stops is None or self._stops.idle
+        return self._worker is None or self._worker.idle
 
     def take(self, e: EpochEstimate) -> None:
-        """Note an epoch of the filter on the way."""
-        if self._stops:
-            self._stops.take(e)
+        """Note an epoch of the filter on the way; the first one of a turn ends the stop before it."""
+        if e.used:
+            self._stop, self._rest_ns = e.stop, e.ns
+        elif not e.dwell and self._rest_ns:
+            self._ask(self._stop, self._rest_ns)
+            self._rest_ns = 0
 
     def end(self) -> None:
         """Ask for the diagnosis of everything, and for its files: ask once result.json is written."""
-        if self._stops:
-            self._stops.end()
+        self._rest_ns = 0
+        self._ask(self._stop, None, report=True)
 
     def report(self) -> None:
         """Ask for the files of what there is, where the job wants any; the result.json that they are of is written."""
@@ -74,21 +74,27 @@ class Diagnosing:
             self.end()
 
     def change_model(self, added: tuple[str, ...]) -> None:
-        """Diagnose again with other effects added."""
-        if self._stops:
-            self._stops.change_model(added)
+        """Ask for the last diagnosis again, with other effects added; the ladder gets a rung."""
+        self._models = [*(model for model in self._models if model != added), added]
+        if self._last is not None:
+            self._ask(*self._last)
 
     def restart(self) -> None:
         """Forget the test."""
-        if self._stops:
-            self._stops.restart()
+        self._models, self._last = self._models[-1:], None
+        self._stop, self._rest_ns = 0, 0
+
+    def _ask(self, stop: int, until_ns: int | None, report: bool = False) -> None:
+        self._last = stop, until_ns
+        if self._worker is not None:
+            self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), report=report))
 
     def tick(self, newest_ns: int) -> None:
         """Publish a diagnosis once it is there; `newest_ns` is the stamp of one of everything."""
-        if self._stops is None:
+        if self._worker is None:
             return
         try:
-            answer = self._stops.answer()
+            answer = self._worker.answer()
         except DataError as error:
             missing = f"; {self._report} gets no {DIAGNOSIS} and no {REPORT}" if self._report else ""
             self._warn(f"{error}{missing}")
@@ -98,7 +104,6 @@ class Diagnosing:
             return
         stamp_ns = newest_ns if answer.request.until_ns is None else answer.request.until_ns
         if isinstance(answer, Answer):
-            self.last = answer
             self._publish(answer, stamp_ns)
         elif answer.png:
             publish(self._picture, messages.picture(stamp_ns, answer.png))
@@ -120,6 +125,6 @@ class Diagnosing:
 
     def close(self) -> None:
         """End the process that diagnoses."""
-        if self._stops:
-            self._stops.close()
-            self._stops = None
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None

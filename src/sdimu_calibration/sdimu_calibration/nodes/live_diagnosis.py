@@ -1,4 +1,4 @@
-"""The diagnosis at the end of each stop: asked of a process of its own, so that no sample waits for a fit."""
+"""The live diagnosis in a process of its own, so that no sample waits for a fit."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
-from typing import Any
 
-from sdimu_calibration.core.live import EpochEstimate
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Picture, WorkerRequest
 
@@ -74,66 +72,3 @@ class Worker:
         self._pipe.close()
         self._process.kill()
         self._process.wait()
-
-
-class StopDiagnosis:
-    """Asks at the end of each stop, and again when the model has changed.
-
-    Attributes
-    ----------
-    about : object
-        For `Job.question`, as it stands when a stop ends.
-
-    Parameters
-    ----------
-    added : tuple of str
-        Effects beyond the model that the test begins with.
-    """
-
-    def __init__(self, worker: Worker, added: tuple[str, ...]) -> None:
-        self._worker = worker
-        self._models = [added]
-        self._stop, self._rest_ns = 0, 0
-        self._last: tuple[int, int | None] | None = None
-        self.about: Any = None
-
-    @property
-    def idle(self) -> bool:
-        """Whether everything that was asked is answered."""
-        return self._worker.idle
-
-    def take(self, e: EpochEstimate) -> None:
-        """Note an epoch; the first one of a turn ends the stop before it."""
-        if e.used:
-            self._stop, self._rest_ns = e.stop, e.ns
-        elif not e.dwell and self._rest_ns:
-            self._ask(self._stop, self._rest_ns)
-            self._rest_ns = 0
-
-    def end(self) -> None:
-        """Ask for the diagnosis of everything, and its files."""
-        self._rest_ns = 0
-        self._ask(self._stop, None, report=True)
-
-    def change_model(self, added: tuple[str, ...]) -> None:
-        """Ask for the last diagnosis again, with other effects added; the ladder gets a rung."""
-        self._models = [*(model for model in self._models if model != added), added]
-        if self._last is not None:
-            self._ask(*self._last)
-
-    def restart(self) -> None:
-        """Forget the test."""
-        self._models, self._last = self._models[-1:], None
-        self._stop, self._rest_ns = 0, 0
-
-    def _ask(self, stop: int, until_ns: int | None, report: bool = False) -> None:
-        self._last = stop, until_ns
-        self._worker.ask(WorkerRequest(stop, until_ns, tuple(self._models), self.about, report))
-
-    def answer(self) -> Answer | Picture | None:
-        """Return a diagnosis once it is there, then its picture; raises as `Worker.answer`."""
-        return self._worker.answer()
-
-    def close(self) -> None:
-        """End the process."""
-        self._worker.close()

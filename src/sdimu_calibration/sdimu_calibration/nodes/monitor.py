@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -21,59 +20,14 @@ from std_msgs.msg import Float64MultiArray
 
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, NS, to_ns
 from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat_map
-from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
+from sdimu_calibration.report.live_seen import Progress
+from sdimu_calibration.report.live_text import SeenChoice
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
 ANSWER_S = 20.0
 """Wall time in which a node answers (s): one that fits a block of samples answers after it."""
 # Watching must never hold up what is watched.
 GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-@dataclass
-class Progress:
-    """How far a test is.
-
-    Attributes
-    ----------
-    table_s, filter_s : float
-        Data time that table and filter have reached (s after the first status).
-    sigmas : dict of str to float
-        Sigma (SI) by coefficient, as last published.
-    first : dict of str to float
-        The first sigma published.
-    nis : dict of str to float
-        Mean squared innovation per degree of freedom at the present stop, by channel.
-    diagnosis : SeenDiagnosis
-        The newest one; of stop -1 before the first.
-    heard : bool
-        Any message has come.
-    nis_by_stop : dict of int to dict of str to float
-        As `nis`, of every stop that was heard of.
-    ladders : dict of int to tuple of (str, str)
-        Models and their errors, by the stop that the diagnosis is of.
-    choices : list of SeenChoice
-        Of a test that chooses its turns, the newest last.
-    """
-
-    stop: int = 0
-    phase: str = "starting"
-    table_s: float = 0.0
-    filter_s: float = 0.0
-    sigmas: dict[str, float] = field(default_factory=dict)
-    first: dict[str, float] = field(default_factory=dict)
-    nis: dict[str, float] = field(default_factory=dict)
-    verdict: str = ""
-    diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
-    heard: bool = False
-    nis_by_stop: dict[int, dict[str, float]] = field(default_factory=dict)
-    ladders: dict[int, Rows] = field(default_factory=dict)
-    choices: list[SeenChoice] = field(default_factory=list)
-
-    @property
-    def is_test(self) -> bool:
-        """Whether what was heard comes from a table or a calibration: /diagnostics has every robot."""
-        return self.phase != "starting" or bool(self.sigmas)
 
 
 class Monitor:

@@ -132,14 +132,6 @@ class TableDriver:
         """Whether a move is under way."""
         return self._future is not None
 
-    def refusal(self, step: Step) -> str:
-        """Say why a step is not possible where the table is now; empty when it is."""
-        try:
-            self._plan(step)
-        except DataError as error:
-            return str(error)
-        return ""
-
     def move(self, step: Step, why: str = "", axis: tuple[int, float] | None = None) -> Future:
         """Carry out a step.
 

@@ -15,14 +15,14 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.site_reference import relative_line
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import table
-from sdimu_calibration.report.drawing import AFTER, BAND, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, Figure, lay_out
 from sdimu_calibration.report.effect_words import effect_of_key, tip, title_of
-from sdimu_calibration.report.export import as_csv, as_yaml
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import is_free
 from sdimu_calibration.report.markup import Draw, folded, quiet, section
 from sdimu_calibration.report.sections import separation
 from sdimu_calibration.report.statistics_section import influence_part
+from sdimu_calibration.report.table import Row
 
 _TEXT = frozenset({"coefficient", "unit"})
 _TRIADS = ("Gyros", "Accelerometers", "Others")
@@ -133,7 +133,7 @@ def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) ->
     size = np.array([prior[name] for name in names])
     sigma: Floats = np.sqrt(np.diag(calibration.covariance))[shown] / size
     figure = Figure()
-    figure.shape("rect", x0=-1.0, x1=1.0, fillcolor=BAND, line={"width": 0}, layer="below")
+    figure.shade(x0=-1.0, x1=1.0)
     figure.add(
         "scatter",
         x=calibration.values[shown] / size,
@@ -153,3 +153,23 @@ def _words(calibration: Calibration, k: int) -> str:
     unit = calibration.display_units[k]
     sigma = float(np.sqrt(calibration.covariance[k, k]))
     return table.with_sigma(from_si(float(calibration.values[k]), unit), from_si(sigma, unit), unit)
+
+
+def as_yaml(rows: Sequence[Row], body_frame: str) -> str:
+    """Coefficients as YAML: a map from name to value, sigma and unit."""
+    lines = [f"body_frame: {body_frame}", "coefficients:"]
+    lines += [
+        f"  {row.name}: {{value: {row.value:.9g}, sigma: {row.sigma:.4g}, unit: {_quoted(row.unit)}}}" for row in rows
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """Coefficients as comma-separated values with a heading."""
+    lines = ["name,value,sigma,unit", *(f"{row.name},{row.value:.9g},{row.sigma:.4g},{row.unit}" for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(unit: str) -> str:
+    """Quote: "1" is a unit, not a number."""
+    return f'"{unit}"'

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.extras import needed
 from sdimu_calibration.report.design.library import as_script
 from sdimu_calibration.report.design.palette import LIGHT, paint
@@ -128,6 +129,27 @@ class Figure:
             if f"{letter}0" not in more:
                 made |= {f"{letter}ref": f"{letter}{n} domain", f"{letter}0": 0, f"{letter}1": 1}
         self.layout["shapes"].append(made)
+
+    def shade(self, *, row: int = 1, col: int = 1, **span: float) -> None:
+        """Shade a span of a panel behind its curves: between `x0` and `x1`, or `y0` and `y1`."""
+        self.shape("rect", row=row, col=col, **span, fillcolor=BAND, line={"width": 0}, layer="below")
+
+    def band(self, x: Floats, low: Floats, high: Floats, **more: Any) -> None:
+        """Fill what lies between two curves (n)."""
+        self.add(
+            "scatter",
+            x=np.concatenate([x, x[::-1]]),
+            y=np.concatenate([low, high[::-1]]),
+            **{
+                "fill": "toself",
+                "fillcolor": BAND,
+                "line": {"width": 0},
+                "mode": "lines",
+                "hoverinfo": "skip",
+                "showlegend": False,
+                **more,
+            },
+        )
 
     def as_plotly(self, theme: str = LIGHT) -> Any:
         """Return it as a `plotly.graph_objects.Figure`, for a notebook or the workbench."""

@@ -16,7 +16,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.recording import Recording, TableLog
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.report.design.library import as_script
-from sdimu_calibration.report.drawing import BAND, Figure, lay_out, literal
+from sdimu_calibration.report.drawing import Figure, lay_out, literal
 from sdimu_calibration.report.markup import Draw, quiet, section
 
 _BLOCKS = 500
@@ -91,9 +91,7 @@ def raw_data(recording: Recording, fit: Fit) -> Figure:
             **place,
         )
         for _, start, end in fit.timetable.stops:
-            figure.shape(
-                "rect", x0=start / 60.0, x1=end / 60.0, fillcolor=BAND, line={"width": 0}, layer="below", **place
-            )
+            figure.shade(x0=start / 60.0, x1=end / 60.0, **place)
         figure.y_axes(title=unit, standoff=4, showgrid=False, **place)
     figure.x_axes(title="time (min)", row=2)
     figure.x_axes(showgrid=False)
@@ -115,11 +113,10 @@ def sequence(table: TableLog, fit: Fit) -> Figure:
             hovertemplate="%{x:.1f} min: %{y:.2f} deg<extra>" + escape(name) + "</extra>",
         )
     for _, start, end in fit.timetable.stops:
-        figure.shape("rect", x0=start / 60.0, x1=end / 60.0, fillcolor=BAND, line={"width": 0}, layer="below")
+        figure.shade(x0=start / 60.0, x1=end / 60.0)
     figure.x_axes(title="time (min)", showgrid=False)
     figure.y_axes(title="angle of the table's axes (deg)")
-    legend = {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0}
-    return lay_out(figure, 300, showlegend=True, legend=legend, margin={"l": 65, "r": 15, "t": 40, "b": 50})
+    return lay_out(figure, 300, showlegend=True, margin={"l": 65, "r": 15, "t": 40, "b": 50})
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.palette import SERIES
-from sdimu_calibration.report.drawing import BAND, Figure, lay_out, literal
+from sdimu_calibration.report.drawing import Figure, lay_out, literal
 from sdimu_calibration.report.groups import groups, is_free, short_name, title
 
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
@@ -43,9 +43,7 @@ def sigma_history(calibration: Calibration) -> Figure:
         figure.y_axes(title=f"sigma ({unit})", type="log", dtick=1, exponentformat="power", **place)
         figure.x_axes(title="time (min)", standoff=2, range=[0, end], **place)
         for start, stop in rotations(history):
-            figure.shape(
-                "rect", x0=start / 60.0, x1=stop / 60.0, fillcolor=BAND, line={"width": 0}, layer="below", **place
-            )
+            figure.shade(x0=start / 60.0, x1=stop / 60.0, **place)
     return lay_out(
         figure, _PANEL_HEIGHT * rows + 60, margin={"l": 70, "r": 50, "t": 40, "b": 50}, font={"size": 12}, hovermode="x"
     )

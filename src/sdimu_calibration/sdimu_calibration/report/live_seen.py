@@ -1,49 +1,60 @@
 """What is known of a test that runs: what is watched of it, what was known before, and where it is in words.
 
-`nodes.monitor.Progress` fills it; terminal and page show it and know no ROS.
+`nodes.monitor` fills it; terminal and page show it and know no ROS.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
 
 from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 
 
-class Seen(Protocol):
-    """What is watched: `nodes.monitor.Progress`, of which this layer must not know."""
-
-    stop: int
-    phase: str
-    table_s: float
-    sigmas: dict[str, float]
-    first: dict[str, float]
-    nis: dict[str, float]
-    verdict: str
-    diagnosis: SeenDiagnosis
-
-
-class SeenTest(Seen, Protocol):
-    """The same with what came before: what a page draws over the test.
+@dataclass
+class Progress:
+    """How far a test is.
 
     Attributes
     ----------
-    filter_s : float
-        Data time that the filter has reached (s).
+    table_s, filter_s : float
+        Data time that table and filter have reached (s after the first status).
+    sigmas : dict of str to float
+        Sigma (SI) by coefficient, as last published.
+    first : dict of str to float
+        The first sigma published.
+    nis : dict of str to float
+        Mean squared innovation per degree of freedom at the present stop, by channel.
+    diagnosis : SeenDiagnosis
+        The newest one; of stop -1 before the first.
+    heard : bool
+        Any message has come.
     nis_by_stop : dict of int to dict of str to float
-        Mean squared innovation per degree of freedom, by stop and channel.
+        As `nis`, of every stop that was heard of.
     ladders : dict of int to tuple of (str, str)
         Models and their errors, by the stop that the diagnosis is of.
     choices : list of SeenChoice
         Of a test that chooses its turns, the newest last.
     """
 
-    filter_s: float
-    nis_by_stop: dict[int, dict[str, float]]
-    ladders: dict[int, Rows]
-    choices: list[SeenChoice]
+    stop: int = 0
+    phase: str = "starting"
+    table_s: float = 0.0
+    filter_s: float = 0.0
+    sigmas: dict[str, float] = field(default_factory=dict)
+    first: dict[str, float] = field(default_factory=dict)
+    nis: dict[str, float] = field(default_factory=dict)
+    verdict: str = ""
+    diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
+    heard: bool = False
+    nis_by_stop: dict[int, dict[str, float]] = field(default_factory=dict)
+    ladders: dict[int, Rows] = field(default_factory=dict)
+    choices: list[SeenChoice] = field(default_factory=list)
+
+    @property
+    def is_test(self) -> bool:
+        """Whether what was heard comes from a table or a calibration: /diagnostics has every robot."""
+        return self.phase != "starting" or bool(self.sigmas)
 
 
 @dataclass(frozen=True)
@@ -66,19 +77,19 @@ class Outline:
     units: Mapping[str, str]
 
 
-def place_words(test: Outline, seen: Seen) -> str:
+def place_words(test: Outline, seen: Progress) -> str:
     """Say at which stop a test is, and whether it turns."""
     of = f" of {test.stops - 1}" if test.stops else ""
     return f"stop {seen.stop}{of} {seen.phase}"
 
 
-def time_words(test: Outline, seen: Seen) -> str:
+def time_words(test: Outline, seen: Progress) -> str:
     """Say how far a test is, in seconds of its data."""
     of = f" of {test.duration_s:.0f}" if test.duration_s else ""
     return f"{seen.table_s:.0f}{of} s"
 
 
-def left_words(test: Outline, seen: Seen, wall_s: float) -> str:
+def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
     """Say how long a test will take at the pace so far.
 
     Parameters

@@ -9,24 +9,27 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sdimu_calibration.core.diagnosis.grades import size_of
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.results import Calibration, Rest
+from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, experiment, first_screen, handheld_sections, sections
 from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.markup import Draw, prose, section
+from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section
 from sdimu_calibration.report.odds_section import odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
-from sdimu_calibration.report.rests_section import rests_section
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
 from sdimu_calibration.report.statistics_section import noise_section
+from sdimu_calibration.report.table import as_far
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.report.unknown_section import unknown_of, unknown_section
 from sdimu_calibration.report.use_section import in_use
@@ -194,3 +197,44 @@ def _under(calibration: Calibration) -> str:
 def _notes(notes: Sequence[str]) -> str:
     items = "".join(f"<li>{prose(note)}</li>" for note in notes)
     return section("Notes", f"<ul>{items}</ul>") if notes else ""
+
+
+_COLUMNS = (
+    "rest",
+    "from (s)",
+    "to (s)",
+    "force x y z (ug)",
+    "in sigmas",
+    "rate x y z (deg/h)",
+    "in sigmas",
+    "turn to it N E D (arcmin)",
+    "in sigmas",
+)
+
+
+def rests_section(rests: Sequence[Rest]) -> str:
+    """List the rests with what the fit leaves over at each."""
+    rows = [_row(number, rest) for number, rest in enumerate(rests)]
+    return section(
+        "Rests and their residuals",
+        grid(_COLUMNS, rows, set()),
+        quiet(
+            "Measured less predicted: the mean force and rate of each rest, and the turn from the rest before it (the "
+            "heading of north is arbitrary). In sigmas: root mean square of the three axes over white noise and the "
+            "scatter that was learned beyond it. A turn with a gap in it says nothing."
+        ),
+    )
+
+
+def _row(number: int, rest: Rest) -> list[str]:
+    out = [str(number), f"{rest.start_s:.1f}", f"{rest.end_s:.1f}"]
+    for residual, sigma, unit in (
+        (rest.force, rest.force_sigma, "ug"),
+        (rest.rate, rest.rate_sigma, "deg/h"),
+        (rest.turn, rest.turn_sigma, "arcmin"),
+    ):
+        seen = bool(np.isfinite(residual).all())
+        shown = as_far([from_si(value, unit) for value in residual], from_si(sigma, unit)) if seen else []
+        out.append("\N{EM SPACE}".join(shown))
+        out.append(f"{np.sqrt(np.mean(np.square(residual))) / sigma:.2f}" if seen and sigma > 0.0 else "")
+    return out

@@ -11,7 +11,7 @@ from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, BEFORE_PALE, INK, MUTED, PALE, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, BEFORE, BEFORE_PALE, INK, MUTED, PALE, Figure, lay_out
 
 _MOST_POINTS = 500
 _BINS = 12
@@ -107,18 +107,7 @@ def _bars(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int])
 
 def _band(figure: Figure, minutes: Floats, sigma: Floats, place: dict[str, int]) -> None:
     t, s = data.envelope(minutes, 3.0 * sigma, 60)
-    figure.add(
-        "scatter",
-        x=np.concatenate([t, t[::-1]]),
-        y=np.concatenate([s, -s[::-1]]),
-        fill="toself",
-        fillcolor=BAND,
-        line={"width": 0},
-        mode="lines",
-        hoverinfo="skip",
-        showlegend=False,
-        **place,
-    )
+    figure.band(t, s, -s, **place)
 
 
 def _raw(figure: Figure, minutes: Floats, y: Floats, place: dict[str, int]) -> None:

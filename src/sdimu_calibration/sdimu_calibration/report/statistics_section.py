@@ -9,7 +9,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
-from sdimu_calibration.report.drawing import BAND, INK, MUTED, Figure, lay_out
+from sdimu_calibration.report.drawing import INK, MUTED, Figure, lay_out
 from sdimu_calibration.report.evidence_figures import deviates
 from sdimu_calibration.report.markup import Draw, folded, quiet, section
 from sdimu_calibration.report.statistics import KINDS, Influence, Whiteness, influences, whiteness
@@ -108,18 +108,7 @@ def over_time(found: Whiteness) -> Figure:
         good = np.isfinite(found.nis[:, k])
         low, high = (np.where(good, v[:, k], np.nan)[good] for v in (found.low, found.high))
         t = found.t[good]
-        figure.add(
-            "scatter",
-            x=np.concatenate([t, t[::-1]]),
-            y=np.concatenate([low, high[::-1]]),
-            fill="toself",
-            fillcolor=BAND,
-            line={"width": 0},
-            mode="lines",
-            hoverinfo="skip",
-            showlegend=False,
-            col=k + 1,
-        )
+        figure.band(t, low, high, col=k + 1)
         figure.add(
             "scatter",
             x=t,
@@ -150,7 +139,7 @@ def autocorrelation(found: Whiteness) -> Figure:
     )
     for channel in range(6):
         place = {"row": channel // 3 + 1, "col": channel % 3 + 1}
-        figure.shape("rect", y0=-found.band, y1=found.band, fillcolor=BAND, line={"width": 0}, layer="below", **place)
+        figure.shade(y0=-found.band, y1=found.band, **place)
         figure.add(
             "bar",
             x=found.lags,

@@ -23,8 +23,6 @@ POWERS = ("temperature", "temperature_squared", "temperature_cubed")
 """Powers of the temperature, as they stand in the names of effects."""
 SEEN_OF_TURNS = tuple(f"gyro_bias_temperature_rate{power}" for power in ("", "_linear", "_quadratic"))
 """Effects by which gyros see axes that turn with each of `POWERS`."""
-RATES = ("temperature_rate", "temperature_rate_linear")
-"""Rates of the first powers of the temperature, as they stand in the names of effects."""
 _SPAN_K = np.linspace(-50.0, 50.0, 11)
 """Temperatures about T0 (K) at which the turned sensor is read: the range in which an IMU is used."""
 _STEP_K = 0.01
@@ -56,35 +54,6 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
     return out
 
 
-def with_lag(truth: ImuTruth, frame: str, lag_s: float) -> dict[str, float]:
-    """State sensors that lag behind their thermometer by what a calibration without a lag finds.
-
-    To first order of the lag L, ``k1 (T - L dT/dt - T0) + k2 (T - L dT/dt - T0)^2`` is the polynomial and rate terms
-    ``-k1 L dT/dt`` and ``-2 k2 L (T - T0) dT/dt``. The frame is that of accelerometers without the lag, so rate terms
-    of axes are those as built.
-
-    Parameters
-    ----------
-    frame : str
-        ``prior`` or ``accelerometer_triad``.
-    lag_s : float
-        s.
-
-    Returns
-    -------
-    dict of str to float
-        As `true_coefficients` (SI).
-    """
-    out = true_coefficients(truth, frame)
-    for name, size in parse_effects(truth.effects).sizes.items():
-        stem, _, part = name.rpartition("_")
-        for times, (power, rate) in enumerate(zip(POWERS, RATES, strict=False), start=1):
-            if stem.endswith(f"_{power}"):
-                late = f"{stem.removesuffix(power)}{rate}_{part}"
-                out[late] = out.get(late, 0.0) - times * lag_s * size
-    return out
-
-
 def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> dict[str, float]:
     """Polynomials of axes, scale factors and mass unbalance in the frame of the accelerometers at each temperature."""
     axes = {triad: _at(input_axes(triad, coefficients), triad, sizes) for triad in _TRIADS}
@@ -99,7 +68,7 @@ def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> di
             out |= {_named(name, power): value for name, value in elements(triad, part + np.eye(3)).items()}
         part = _power_of(unbalance @ R.transpose(0, 2, 1), order)
         out |= {_named(name, power): value for name, value in unbalance_elements(part).items()}
-    ahead, behind = (_frames(coefficients, sizes, _SPAN_K + step) for step in (_STEP_K, -_STEP_K))
+    ahead, behind = (accelerometer_frames(coefficients, sizes, _SPAN_K + step) for step in (_STEP_K, -_STEP_K))
     turn = [rotation_vector(one @ other.T) / (2.0 * _STEP_K) for one, other in zip(behind, ahead, strict=True)]
     seen = np.einsum("kij,klj,kl->ki", axes["gyro"], R, np.array(turn))
     for order, effect in enumerate(SEEN_OF_TURNS):
@@ -109,8 +78,8 @@ def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> di
     return out
 
 
-def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
-    """Turn from the body frame in which a sensor was built to that of its accelerometers at every temperature.
+def accelerometer_frames(coefficients: Mapping[str, float], sizes: Mapping[str, float], above_k: Floats) -> Floats:
+    """Turn from the body frame in which a sensor was built to that of its accelerometers: R in v_triad = R v_b.
 
     Parameters
     ----------
@@ -120,12 +89,7 @@ def accelerometer_frames(truth: ImuTruth, above_k: Floats) -> Floats:
     Returns
     -------
     ndarray, shape (k, 3, 3)
-        R in v_triad = R v_b.
     """
-    return _frames(truth.coefficients, parse_effects(truth.effects).sizes, above_k)
-
-
-def _frames(coefficients: Mapping[str, float], sizes: Mapping[str, float], above_k: Floats) -> Floats:
     axes = _at(input_axes("accel", coefficients), "accel", sizes, above_k)
     return np.array([triad_rotation(M) for M in axes])
 

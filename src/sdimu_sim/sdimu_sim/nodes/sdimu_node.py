@@ -22,13 +22,13 @@ from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float64MultiArray
 
 from rate_table_sim.nodes.motion_message import decode_motion
-from sdimu_calibration.nodes.convert import encode_imu
 from sdimu_calibration.nodes.credits import LATCHED, NS, STREAM, Consumer, Producer, header, publish
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.nodes.transform_type import transform_class
 from sdimu_calibration.nodes.transforms import IDENTITY, PLATFORM, STATIC, TransformMessage
+from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.cli.options import mount_rad
 from sdimu_sim.core.generator import ImuGenerator
@@ -64,7 +64,9 @@ class SdimuNode:
         profile = scenario.temperature
         self._thermometer = None if profile is None else Thermometer(profile, scenario.seed)
         imu = imu_truth(scenario)
-        self._variance = (imu.gyro_white_noise**2 * self._rate_hz, imu.accel_white_noise**2 * self._rate_hz)
+        white = imu.gyro_white_noise, imu.accel_white_noise
+        gyro, accel = (noise**2 * self._rate_hz * np.eye(3) for noise in white)
+        self._covariances = gyro, accel
         self._generator = ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, profile)
         _warm_up(ImuGenerator(imu, scenario.site, self._rate_hz, scenario.seed, profile))
         if truth_file:
@@ -141,7 +143,7 @@ class SdimuNode:
             self._place.publish(TransformMessage([(PLATFORM, self._frame)]).encode(self._start_ns, [IDENTITY]))
         samples = self._generator.advance(PlatformMotion(t, q_nt, omega_nt_t))
         stamps = self._start_ns + samples.ns
-        encoded = encode_imu(stamps, samples.omega_ib_b, samples.f_ib_b, self._frame, *self._variance)
+        encoded = encode_imu(stamps, samples.omega_ib_b, samples.f_ib_b, self._frame, self._covariances)
         queue: list[tuple[int, Any, Any]] = [
             (stamp, self._imu, raw) for stamp, raw in zip(stamps.tolist(), encoded, strict=True)
         ]

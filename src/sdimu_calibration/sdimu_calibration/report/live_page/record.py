@@ -15,7 +15,7 @@ from uuid import uuid4
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.live_page.curves import Curves, Drawn
-from sdimu_calibration.report.live_seen import Outline, SeenTest, left_words, place_words, time_words
+from sdimu_calibration.report.live_seen import Outline, Progress, left_words, place_words, time_words
 from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light
 
@@ -63,13 +63,11 @@ class Head:
 
 
 @dataclass(frozen=True)
-class LiveView:
-    """A record at a moment.
+class _Kept:
+    """What a record holds.
 
     Attributes
     ----------
-    versions : mapping of str to int
-        By part; with the run, by which a page knows whether it is the same test.
     nis : tuple of (int, mapping)
         Stop, and mean squared innovation per degree of freedom by channel.
     errors : tuple of (int, rows)
@@ -78,23 +76,6 @@ class LiveView:
         Time of the test (s) from which it was watched.
     """
 
-    run: str
-    versions: Mapping[str, int]
-    head: Head
-    curves: Drawn
-    fallen: tuple[Falling, ...]
-    nis: tuple[tuple[int, Mapping[str, float]], ...]
-    diagnosis: SeenDiagnosis
-    errors: tuple[tuple[int, Rows], ...]
-    choices: tuple[SeenChoice, ...]
-    answer: str
-    joined_s: float
-
-
-@dataclass
-class _Kept:
-    """What a record holds."""
-
     head: Head = field(default_factory=Head)
     fallen: tuple[Falling, ...] = ()
     nis: tuple[tuple[int, Mapping[str, float]], ...] = ()
@@ -102,7 +83,16 @@ class _Kept:
     errors: tuple[tuple[int, Rows], ...] = ()
     choices: tuple[SeenChoice, ...] = ()
     answer: str = ""
-    joined_s: float = -1.0
+    joined_s: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveView(_Kept):
+    """A record at a moment, with its version by part; a page knows by the run whether it is the same test."""
+
+    run: str
+    versions: Mapping[str, int]
+    curves: Drawn
 
 
 class LiveRecord:
@@ -125,7 +115,7 @@ class LiveRecord:
         self._versions = dict.fromkeys(PARTS, 0)
         self._asked: SimpleQueue[str] = SimpleQueue()
 
-    def take(self, seen: SeenTest, streaming: bool, wall_s: float) -> None:
+    def take(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Take what is seen now.
 
         Parameters
@@ -138,20 +128,20 @@ class LiveRecord:
         fallen = tuple(falling(seen.first, seen.sigmas, self._test.units, self._test.effects))
         head = self._where(seen, streaming, wall_s)
         with self._lock:
-            if self._kept.joined_s < 0.0 and seen.table_s > 0.0:
-                self._kept.joined_s = seen.table_s
-            self._put(HEAD, "head", head)
+            if not self._kept.joined_s:
+                self._kept = replace(self._kept, joined_s=seen.table_s)
+            self._put(HEAD, head=head)
             if self._curves.add(seen.filter_s, {f.effect: f.share for f in fallen}):
-                self._kept.fallen = fallen
+                self._kept = replace(self._kept, fallen=fallen)
                 self._versions[CURVES] += 1
-            self._put(STOPS, "nis", tuple(sorted((stop, dict(nis)) for stop, nis in seen.nis_by_stop.items())))
+            self._put(STOPS, nis=tuple(sorted((stop, dict(nis)) for stop, nis in seen.nis_by_stop.items())))
             if seen.diagnosis is not self._kept.diagnosis:
-                self._kept.diagnosis = seen.diagnosis
+                self._kept = replace(self._kept, diagnosis=seen.diagnosis)
                 self._versions[DIAGNOSIS] += 1
-            self._put(DIAGNOSIS, "errors", tuple(sorted(seen.ladders.items())))
-            self._put(CHOICES, "choices", tuple(seen.choices))
+            self._put(DIAGNOSIS, errors=tuple(sorted(seen.ladders.items())))
+            self._put(CHOICES, choices=tuple(seen.choices))
 
-    def _where(self, seen: SeenTest, streaming: bool, wall_s: float) -> Head:
+    def _where(self, seen: Progress, streaming: bool, wall_s: float) -> Head:
         test = self._test
         if not seen.table_s:
             return Head()
@@ -163,38 +153,27 @@ class LiveRecord:
             min(seen.table_s / test.duration_s, 1.0) if test.duration_s else None,
         )
 
-    def _put(self, part: str, name: str, value: Any) -> None:
-        if getattr(self._kept, name) != value:
-            setattr(self._kept, name, value)
+    def _put(self, part: str, **values: Any) -> None:
+        if any(getattr(self._kept, name) != value for name, value in values.items()):
+            self._kept = replace(self._kept, **values)
             self._versions[part] += 1
 
     def tell(self, place: str) -> None:
         """Say in the place of the stop what is done after the last sample."""
         with self._lock:
-            self._put(HEAD, "head", replace(self._kept.head, place=place, time=""))
+            self._put(HEAD, head=replace(self._kept.head, place=place, time=""))
 
     def end(self, end: End) -> None:
         """Say that nothing more will come, and why; the first end counts."""
         with self._lock:
             if self._kept.head.end is None:
-                self._put(HEAD, "head", replace(self._kept.head, place="ended", time="", end=end))
+                self._put(HEAD, head=replace(self._kept.head, place="ended", time="", end=end))
 
     def view(self) -> LiveView:
         """Return the record as it is now."""
         with self._lock:
-            kept = self._kept
             return LiveView(
-                self._run,
-                dict(self._versions),
-                kept.head,
-                self._curves.drawn(),
-                kept.fallen,
-                kept.nis,
-                kept.diagnosis,
-                kept.errors,
-                kept.choices,
-                kept.answer,
-                max(kept.joined_s, 0.0),
+                run=self._run, versions=dict(self._versions), curves=self._curves.drawn(), **vars(self._kept)
             )
 
     def ask(self, effect: str) -> None:
@@ -207,7 +186,7 @@ class LiveRecord:
         with self._lock:
             if self._kept.head.end is not None:
                 raise DataError("the test has ended: sdimu calibrate --add takes an effect into its result")
-            self._put(ANSWER, "answer", f"adding {effect}: the test is asked \N{HORIZONTAL ELLIPSIS}")
+            self._put(ANSWER, answer=f"adding {effect}: the test is asked \N{HORIZONTAL ELLIPSIS}")
         self._asked.put(effect)
 
     def carry_out(self, add: Callable[[list[str]], str]) -> None:
@@ -222,7 +201,7 @@ class LiveRecord:
             why = add([effect])
             done = f"{effect} is in the model; the next diagnosis tells the error with and without it"
             with self._lock:
-                self._put(ANSWER, "answer", f"not added: {' '.join(why.split())}" if why else done)
+                self._put(ANSWER, answer=f"not added: {' '.join(why.split())}" if why else done)
 
     def _next_asked(self) -> str | None:
         try:

@@ -17,24 +17,9 @@ from sdimu_calibration.report.workbench.dash_page import application
 from sdimu_calibration.report.workbench.guard import LOOPBACK
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
 from sdimu_calibration.report.workbench.state import from_json
-from sdimu_calibration.report.workbench.steps import NOTHING, step
+from sdimu_calibration.report.workbench.steps import BUTTONS, NOTHING, step
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
 
-_BUTTONS = (
-    "undo",
-    "redo",
-    "add",
-    "add-own",
-    "drop",
-    "hold",
-    "toggle-stop",
-    "leave-points",
-    "take-points",
-    "fix",
-    "set-prior",
-    "free",
-    "open",
-)
 _CONTROLS = {
     "candidate": Kept("candidate", "value"),
     "own": Kept("own", "value"),
@@ -84,7 +69,7 @@ def _follow_clicks(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> Non
     @app.callback(
         output=[Output("state", "data"), Output("message", "children")],
         inputs={
-            "clicks": [Input(name, "n_clicks") for name in _BUTTONS],
+            "clicks": [Input(name, "n_clicks") for name in BUTTONS],
             "seen": {"cell": Input("heat", "clickData"), "channel": Input("channel", "value")},
             "controls": _CONTROLS,
             "kept": Kept("state", "data"),

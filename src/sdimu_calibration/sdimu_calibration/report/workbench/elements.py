@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from dash import dcc, html
@@ -12,6 +13,12 @@ from sdimu_calibration.report.design.library import CONFIG
 def card(title: str, *parts: Any, more: str = "") -> Any:
     """Return a card; `more` are further classes."""
     return html.Section([html.H2(title), *parts], className=f"card {more}".strip())
+
+
+def table(headings: Sequence[str], rows: Iterable[Any]) -> Any:
+    """Return a table; a row is its texts, or a row of the page already."""
+    made = [row if isinstance(row, html.Tr) else html.Tr([html.Td(cell) for cell in row]) for row in rows]
+    return html.Table([html.Thead(html.Tr([html.Th(word) for word in headings])), html.Tbody(made)])
 
 
 def graph(name: str, words: str) -> Any:

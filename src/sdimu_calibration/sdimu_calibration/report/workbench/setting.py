@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 _APART_S = 0.01
 """Spans nearer to each other (s) are one: epochs that follow each other."""
@@ -77,19 +76,3 @@ def _is_of(coefficient: str, effects: list[str]) -> bool:
     own = [line.partition(":")[2].strip() for line in lines if line.startswith("name:")]
     named = [text.partition("(")[0] for text in effects if "\n" not in text]
     return any(coefficient.startswith(name) for name in (*own, *named))
-
-
-def setting_from(kept: Any) -> Setting:
-    """Read what a page kept.
-
-    Raises
-    ------
-    AttributeError, TypeError, ValueError
-        When it is no setting.
-    """
-    return Setting(
-        tuple(map(str, kept.get("added", ()))),
-        tuple(map(int, kept.get("held", ()))),
-        tuple((float(a), float(b)) for a, b in kept.get("cut", ())),
-        tuple((str(name), str(mean), str(sigma)) for name, mean, sigma in kept.get("priors", ())),
-    )

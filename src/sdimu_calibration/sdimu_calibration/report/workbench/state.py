@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from sdimu_calibration.report.workbench.setting import Setting, setting_from
+from pydantic import TypeAdapter, ValidationError
+
+from sdimu_calibration.report.workbench.setting import Setting
 
 _MOST_STEPS = 100
 """Number of steps that undo goes back: each is sent with every click."""
@@ -95,15 +97,6 @@ class State:
 def from_json(kept: Any) -> State:
     """Read what the page kept; anything else is a fresh page."""
     try:
-        cell = kept.get("cell")
-        past, future, seen = (tuple(map(setting_from, kept.get(name, ()))) for name in ("past", "future", "seen"))
-        return State(
-            setting_from(kept.get("now", {})),
-            (int(cell[0]), int(cell[1])) if cell else None,
-            past,
-            future,
-            seen,
-            str(kept.get("recording", "")),
-        )
-    except (AttributeError, TypeError, ValueError, IndexError, KeyError, OverflowError):
+        return TypeAdapter(State).validate_python(kept)
+    except ValidationError:
         return State()

@@ -143,6 +143,7 @@ STEPS: Mapping[str, Callable[[State, Controls], State]] = {
     "channel": _look_at_channel,
 }
 """Every step by the name of what is clicked."""
+BUTTONS = tuple(name for name in STEPS if name not in {"heat", "channel"})
 NOTHING = {
     "undo": "Nothing to undo.",
     "redo": "Nothing to redo.",

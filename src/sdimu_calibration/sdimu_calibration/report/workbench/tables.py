@@ -12,6 +12,7 @@ from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.error_figures import log_likelihood
 from sdimu_calibration.core.units import from_si, parse_quantity
 from sdimu_calibration.report.table import as_far
+from sdimu_calibration.report.workbench.elements import table
 from sdimu_calibration.report.workbench.fit import FitSession, Fitted
 from sdimu_calibration.report.workbench.own_effect import named
 from sdimu_calibration.report.workbench.parts import span
@@ -35,19 +36,15 @@ def models(bench: FitSession, settings: Sequence[Setting], here: Setting) -> Any
     """
     found = [(setting, bench.known(setting)) for setting in settings]
     rows: list[tuple[Setting, Fitted]] = [(setting, fitted) for setting, fitted in found if fitted is not None]
-    return html.Table(
-        [
-            html.Thead(html.Tr([html.Th(word) for word in _HEADINGS])),
-            html.Tbody(
-                [
-                    html.Tr(
-                        [html.Td(text) for text in _model(setting, fitted, bench.known(setting.given))],
-                        className="here" if setting == here else "",
-                    )
-                    for setting, fitted in rows
-                ]
-            ),
-        ]
+    return table(
+        _HEADINGS,
+        (
+            html.Tr(
+                [html.Td(text) for text in _model(setting, fitted, bench.known(setting.given))],
+                className="here" if setting == here else "",
+            )
+            for setting, fitted in rows
+        ),
     )
 
 
@@ -126,4 +123,4 @@ def coefficients(given: Fitted, now: Fitted, setting: Setting) -> Any:
                 **{"data-coefficient": name},
             )
         )
-    return html.Table([html.Thead(html.Tr([html.Th(word) for word in headings])), html.Tbody(rows)])
+    return table(headings, rows)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 from dash import Output
 
+from sdimu_calibration.report.workbench.steps import BUTTONS
+
 _WORDS = {
     "read": "Reading the recording",
     "passes": "Fitting",
@@ -14,27 +16,7 @@ _WORDS = {
 }
 _MOST_PAGES = 200
 _WORKING = [(Output("busy", "hidden"), False, True), (Output("tick", "disabled"), False, True)]
-BUSY = [
-    *_WORKING,
-    *(
-        (Output(button, "disabled"), True, False)
-        for button in (
-            "add",
-            "undo",
-            "redo",
-            "add-own",
-            "hold",
-            "toggle-stop",
-            "leave-points",
-            "take-points",
-            "drop",
-            "fix",
-            "set-prior",
-            "free",
-            "open",
-        )
-    ),
-]
+BUSY = [*_WORKING, *((Output(button, "disabled"), True, False) for button in BUTTONS)]
 """What a page shows while it is fitted for."""
 LOOKING = [*_WORKING, (Output("candidates", "className"), "stale", "")]
 """What a page shows while candidates are scored for it."""

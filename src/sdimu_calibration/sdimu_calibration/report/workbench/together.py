@@ -13,6 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError, from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.table import with_sigma
+from sdimu_calibration.report.workbench.elements import table
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -59,15 +60,9 @@ def shown(found: SetDiagnosis) -> list[Any]:
         for f in found.findings
     ]
     heads = ("effect", "in", "size", "score", "looks the same")
-    table = html.Table(
-        [
-            html.Thead(html.Tr([html.Th(word) for word in heads])),
-            html.Tbody([html.Tr([html.Td(text) for text in row]) for row in rows]),
-        ]
-    )
     tone = "good" if found.verdict == Verdict.CONSISTENT else "bad"
     return [
         html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"),
-        *([table] if rows else []),
+        *([table(heads, rows)] if rows else []),
         *(html.P(f"Advice: {sentence(one)}") for one in found.advice),
     ]

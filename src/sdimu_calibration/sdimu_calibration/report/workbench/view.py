@@ -207,42 +207,30 @@ def _right() -> Any:
     return html.Div(
         [
             card("How probable each cause is", html.Div(id="odds")),
-            html.Section(
-                [
-                    html.H2("The candidate"),
-                    html.Div("Click a bar, or press J.", id="preview", className="candidate"),
-                    html.Div(
-                        html.Button("Add it and fit", id="add", className="main-action", title="A"),
-                        className="controls",
-                    ),
-                ],
-                className="card",
+            card(
+                "The candidate",
+                html.Div("Click a bar, or press J.", id="preview", className="candidate"),
+                html.Div(
+                    html.Button("Add it and fit", id="add", className="main-action", title="A"), className="controls"
+                ),
             ),
-            html.Section(
-                [
-                    html.H2("Added to the model"),
-                    dcc.Dropdown(id="added", placeholder="choose one to take out"),
-                    html.Div(html.Button("Take out", id="drop"), className="controls"),
-                ],
-                className="card control",
+            card(
+                "Added to the model",
+                dcc.Dropdown(id="added", placeholder="choose one to take out"),
+                html.Div(html.Button("Take out", id="drop"), className="controls"),
+                more="control",
             ),
-            html.Section(
-                [
-                    html.H2("Left out of the fit"),
-                    dcc.Dropdown(id="held", options=[], multi=True, placeholder="no stop"),
-                    html.Div(
-                        [html.Button("Leave these stops out", id="hold"), html.Span(id="cut")], className="controls"
-                    ),
-                ],
-                className="card control",
+            card(
+                "Left out of the fit",
+                dcc.Dropdown(id="held", options=[], multi=True, placeholder="no stop"),
+                html.Div([html.Button("Leave these stops out", id="hold"), html.Span(id="cut")], className="controls"),
+                more="control",
             ),
-            html.Section(
-                [
-                    html.H2("Recording"),
-                    dcc.Dropdown(id="recording", options=[], clearable=False),
-                    html.Div(html.Button("Open", id="open"), className="controls"),
-                ],
-                className="card control",
+            card(
+                "Recording",
+                dcc.Dropdown(id="recording", options=[], clearable=False),
+                html.Div(html.Button("Open", id="open"), className="controls"),
+                more="control",
             ),
         ],
         className="column",
@@ -288,45 +276,38 @@ def _coefficients() -> Any:
 
 
 def _own() -> Any:
-    return html.Section(
-        [
-            html.H2("An effect of your own, as an expression"),
-            html.Label("Effect file", htmlFor="own", className="switch"),
-            dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
-            html.Div(
-                [
-                    html.Button("Look at it", id="look-own"),
-                    html.Button("Add this", id="add-own"),
-                    dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
-                ],
-                className="controls",
-            ),
-        ],
-        className="card control",
+    return card(
+        "An effect of your own, as an expression",
+        html.Label("Effect file", htmlFor="own", className="switch"),
+        dcc.Textarea(id="own", value=TEMPLATE, rows=8, persistence=True, persistence_type="session"),
+        html.Div(
+            [
+                html.Button("Look at it", id="look-own"),
+                html.Button("Add this", id="add-own"),
+                dcc.Upload(html.Button("Read a file"), id="upload", accept=".yaml,.yml"),
+            ],
+            className="controls",
+        ),
+        more="control",
     )
 
 
 def _home() -> Any:
-    return html.Section(
-        [
-            html.H2("Take home"),
-            html.P("Model, calibration, report, the session and the command that gives the same numbers."),
-            html.Button("Model, calibration and report", id="export", title="E"),
-            dcc.Download(id="file"),
-        ],
-        className="card control",
+    return card(
+        "Take home",
+        html.P("Model, calibration, report, the session and the command that gives the same numbers."),
+        html.Button("Model, calibration and report", id="export", title="E"),
+        dcc.Download(id="file"),
+        more="control",
     )
 
 
 def _set() -> Any:
-    return html.Section(
-        [
-            html.H2("All recordings together"),
-            html.P("One fit of the recordings as one unit, with the effects that are added here."),
-            html.Button("Judge them together", id="judge"),
-            html.Div(id="judged", className="scroll"),
-        ],
-        className="card",
+    return card(
+        "All recordings together",
+        html.P("One fit of the recordings as one unit, with the effects that are added here."),
+        html.Button("Judge them together", id="judge"),
+        html.Div(id="judged", className="scroll"),
     )
 
 

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sdimu_calibration.core.compensation import Compensator, compensate, heat_since
+from sdimu_calibration.core.compensation import Compensated, Compensator, compensate, heat_since
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_file import read_topics
 from sdimu_calibration.storage.bags.bag_folder import check_apart, check_room
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
-from sdimu_calibration.storage.bags.compensated_imu import encode_compensated
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
 COMPENSATED = "/imu/data"
@@ -89,3 +88,14 @@ def write_compensated(
             if progress is not None:
                 progress("compensate", min(1.0, (first + _BLOCK) / len(stamps)))
     return Written(len(stamps), float(largest[:3].max()), float(largest[3:].max()))
+
+
+def frame_of(body_frame: str) -> str:
+    """Name the frame of compensated samples: no longer the axes of the housing, but those of the coefficients."""
+    return f"imu_{body_frame}"
+
+
+def encode_compensated(stamp_ns: cdr.Stamps, samples: Compensated, frame_id: str) -> list[bytes]:
+    """Encode compensated samples as sensor_msgs/Imu, each with its covariances."""
+    covariances = samples.omega_covariance, samples.f_covariance
+    return cdr.encode_imu(np.asarray(stamp_ns), samples.omega_ib_b, samples.f_ib_b, frame_id, covariances)

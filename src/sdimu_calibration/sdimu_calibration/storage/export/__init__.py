@@ -22,7 +22,7 @@ from sdimu_calibration.storage.export import (
     openvins,
     yaml_file,
 )
-from sdimu_calibration.storage.export.shared import Source
+from sdimu_calibration.storage.export.shared import Source, cannot_hold
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 
@@ -36,10 +36,10 @@ class Form(NamedTuple):
 
 
 FORMS = {
-    "matrices": Form("compensation.txt", matrices.texts, matrices.cannot_hold),
-    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, kalibr.cannot_hold, True),
+    "matrices": Form("compensation.txt", matrices.texts, cannot_hold),
+    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, cannot_hold, True),
     "kalibr-noise": Form("kalibr-imu.yaml", noise_file.kalibr_texts, noise_file.cannot_hold, True),
-    "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, openvins.cannot_hold, True),
+    "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, cannot_hold, True),
     "gtsam": Form("imu_metadata.txt", noise_file.gtsam_texts, noise_file.cannot_hold, True),
     "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
     "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),

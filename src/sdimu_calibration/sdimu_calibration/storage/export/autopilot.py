@@ -15,7 +15,8 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.storage.export.shared import Source, bent, comments, number, warm
+from sdimu_calibration.storage.export import shared
+from sdimu_calibration.storage.export.shared import Source, by_force, comments, number
 
 _REAL = 9
 """MAV_PARAM_TYPE_REAL32 of MAVLink: the type of every parameter here."""
@@ -80,7 +81,4 @@ def cannot_hold(linear: LinearModel) -> list[str]:
         off = float(np.abs(matrix - np.diag(np.diag(matrix))).max())
         if off:
             lost.append(f"misalignment of the {words}, up to {from_si(off, 'arcmin'):.3g} arcmin")
-    if np.any(linear.by_force):
-        largest = float(np.abs(linear.by_force).max())
-        lost.append(f"G: mass unbalance and g-sensitivity of the gyros, up to {largest:.3g} (rad/s)/(m/s^2)")
-    return lost + bent(linear) + warm(linear)
+    return lost + by_force(linear) + shared.cannot_hold(linear)

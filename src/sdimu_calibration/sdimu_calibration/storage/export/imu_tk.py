@@ -12,7 +12,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
-from sdimu_calibration.storage.export.shared import Source, bent, comments, row, warm
+from sdimu_calibration.storage.export import shared
+from sdimu_calibration.storage.export.shared import Source, by_force, comments, row
 
 
 def texts(source: Source) -> dict[str, str]:
@@ -35,8 +36,4 @@ def _text(source: Source, matrix: Floats, bias: Floats, title: str) -> str:
 
 def cannot_hold(linear: LinearModel) -> list[str]:
     """Say what is left out: the gyros' sensitivity to force has no place in the form."""
-    lost = bent(linear) + warm(linear)
-    if np.any(linear.by_force):
-        largest = float(np.abs(linear.by_force).max())
-        lost.insert(0, f"G: mass unbalance and g-sensitivity of the gyros, up to {largest:.3g} (rad/s)/(m/s^2)")
-    return lost
+    return by_force(linear) + shared.cannot_hold(linear)

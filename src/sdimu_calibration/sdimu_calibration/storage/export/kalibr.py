@@ -17,7 +17,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number, warm
+from sdimu_calibration.storage.export.shared import Source, comments, flow, number
 
 _TRIANGULAR = 1e-12
 """Largest number above the diagonal that is rounding."""
@@ -84,11 +84,6 @@ def lower_and_rotation(matrix: Floats) -> tuple[Floats, Floats]:
     sign = np.sign(np.diag(U))
     M, C = (U * sign[:, None]).T, (Q * sign).T
     return np.tril(M), C
-
-
-def cannot_hold(linear: LinearModel) -> list[str]:
-    """Say what is left out."""
-    return bent(linear) + warm(linear)
 
 
 def block(name: str, matrix: Floats) -> list[str]:

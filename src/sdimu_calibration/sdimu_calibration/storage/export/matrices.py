@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.compensation import LinearModel
-from sdimu_calibration.storage.export.shared import Source, bent, comments, row, warm
+from sdimu_calibration.storage.export.shared import Source, comments, row
 
 
 def texts(source: Source) -> dict[str, str]:
@@ -14,8 +13,3 @@ def texts(source: Source) -> dict[str, str]:
         lines += [f"# {name}", *map(row, block)]
     lines += ["# b_g", row(linear.gyro_bias), "# b_a", row(linear.accel_bias)]
     return {"": "\n".join(lines) + "\n"}
-
-
-def cannot_hold(linear: LinearModel) -> list[str]:
-    """Say what is left out."""
-    return bent(linear) + warm(linear)

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.compensation import LinearModel
 from sdimu_calibration.storage.export.kalibr import block, lower_and_rotation, lower_only, noise_lines
-from sdimu_calibration.storage.export.shared import Source, bent, comments, flow, number, warm
+from sdimu_calibration.storage.export.shared import Source, comments, flow, number
 
 
 def texts(source: Source) -> dict[str, str]:
@@ -45,8 +44,3 @@ def texts(source: Source) -> dict[str, str]:
         f"  accelerometer_bias: {flow(linear.accel_bias)}  # m/s^2",
     ]
     return {"": "\n".join(lines) + "\n"}
-
-
-def cannot_hold(linear: LinearModel) -> list[str]:
-    """Say what is left out."""
-    return bent(linear) + warm(linear)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import Factor, LinearModel, Part
 from sdimu_calibration.core.plain_text import one_line
@@ -88,3 +90,16 @@ def warm(linear: LinearModel) -> list[str]:
 def bent(linear: LinearModel) -> list[str]:
     """Say which coefficients matrices cannot hold."""
     return [f"{name} (not a matrix; use sdimu compensate)" for name in linear.left]
+
+
+def cannot_hold(linear: LinearModel) -> list[str]:
+    """Say what a form of the matrices and biases leaves out."""
+    return bent(linear) + warm(linear)
+
+
+def by_force(linear: LinearModel) -> list[str]:
+    """Say that a form has no place for the gyros' sensitivity to force: one line, or none."""
+    if not np.any(linear.by_force):
+        return []
+    largest = float(np.abs(linear.by_force).max())
+    return [f"G: mass unbalance and g-sensitivity of the gyros, up to {largest:.3g} (rad/s)/(m/s^2)"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from typing import NamedTuple
 
 import numpy as np
@@ -44,19 +45,8 @@ def _length(content: Bytes, at: int) -> int:
     return length if known and at + HEAD + length <= content.shape[0] else -1
 
 
-@compiled
-def _table() -> NDArray[np.uint32]:
-    """Remainders of all bytes by the polynomial of CRC-32 (as of `zlib.crc32`), shape (256,)."""
-    out = np.empty(256, dtype=np.uint32)
-    for byte in range(256):
-        rest = np.uint32(byte)
-        for _ in range(8):
-            low = rest & np.uint32(1)
-            rest = rest >> np.uint32(1)
-            if low:
-                rest = rest ^ np.uint32(0xEDB88320)
-        out[byte] = rest
-    return out
+_TABLE = np.array([zlib.crc32(bytes([byte ^ 0xFF])) ^ 0xFF000000 for byte in range(256)], dtype=np.uint32)
+"""Remainders of all bytes by the polynomial of CRC-32: its own begins from ones, and ends with them."""
 
 
 @compiled
@@ -73,9 +63,8 @@ def _whole(content: Bytes, at: int, length: int, table: NDArray[np.uint32]) -> b
 
 
 @compiled
-def _walk(content: Bytes, at: int) -> tuple[int, int, int, int]:
+def _walk(content: Bytes, at: int, table: NDArray[np.uint32]) -> tuple[int, int, int, int]:
     samples, statuses, temperatures = 0, 0, 0
-    table = _table()
     while True:
         length = _length(content, at)
         if length < 0 or not _whole(content, at, length, table):
@@ -122,7 +111,7 @@ def walk(content: Bytes, at: int) -> tuple[int, Counts]:
     at : int
         Place of the first record.
     """
-    end, *counts = _walk(content, at)
+    end, *counts = _walk(content, at, _TABLE)
     return int(end), Counts(*map(int, counts))
 
 
