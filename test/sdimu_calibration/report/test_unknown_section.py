@@ -33,3 +33,13 @@ def test_each_axis_is_drawn_against_each_component_in_customary_units(kind):
     for k, trace in enumerate(traces):
         np.testing.assert_allclose(trace.x, np.asarray(SHOWN[kind])[:, k % columns])
         np.testing.assert_allclose(trace.y, mean[at, k // columns])
+
+
+def test_only_the_sensors_that_have_it_are_drawn():
+    mean = np.arange(12.0).reshape(4, 3)
+    found = UnknownFunction("accel", ATTITUDE, VARIABLE[ATTITUDE], TURNING, mean, 0.0 * mean, axes=(1,))
+    figure = followed(found).as_plotly()
+    assert len(figure.data) == 3
+    assert figure.layout.yaxis.title.text == "accel y (ug)"
+    for trace in figure.data:
+        np.testing.assert_allclose(trace.y, mean[~TURNING, 1] / 9.80665e-6)

@@ -14,7 +14,7 @@ from sdimu_calibration.report.drawing import MUTED, Figure, lay_out
 from sdimu_calibration.report.markup import Draw, quiet, section
 
 _AXES = "xyz"
-_NAMES = {"gyro": ("Gyros", "deg/h"), "accel": ("Accelerometers", "ug")}
+_UNITS = {"gyro": "deg/h", "accel": "ug"}
 _FOLLOWED = {
     ATTITUDE: ("force along {} (g)", 1.0, "at rest, against the share of gravity along each body axis"),
     RATE: ("rate about {} (deg/s)", float(np.degrees(1.0)), "in turns, against the rate about each body axis"),
@@ -47,7 +47,7 @@ def unknown_of(diagnosis: Diagnosis) -> tuple[UnknownFunction, ...]:
 
 def followed(found: UnknownFunction) -> Figure:
     """Error of each sensor that has it against each component of what it follows, a panel each."""
-    name, unit = _NAMES[found.triad]
+    unit = _UNITS[found.triad]
     title, factor, _ = _FOLLOWED[found.follows]
     at = found.turning if found.follows == RATE else ~found.turning
     columns = found.variable.shape[1]
@@ -70,5 +70,5 @@ def followed(found: UnknownFunction) -> Figure:
             )
             if axis == found.axes[-1]:
                 figure.x_axes(title=title.format(_AXES[col]), row=row + 1, col=col + 1)
-        figure.y_axes(title=f"{_AXES[axis]} ({unit})", row=row + 1, col=1)
-    return lay_out(figure, 155 + 155 * len(found.axes), title=name, margin={"l": 70, "r": 20, "t": 50, "b": 55})
+        figure.y_axes(title=f"{found.triad} {_AXES[axis]} ({unit})", row=row + 1, col=1)
+    return lay_out(figure, 125 + 155 * len(found.axes), margin={"l": 80, "r": 20, "t": 20, "b": 55})

@@ -162,7 +162,7 @@ def diagnose_set(
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)
         refused += tuple(f for f in findings if f.tag in needed_not)
-        why = f"{why} {_explained(again.sensors, needed_not)}".strip()
+        why = f"{_explained(again.sensors, needed_not)} {why}".strip()
         after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
