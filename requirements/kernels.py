@@ -26,7 +26,9 @@ from sdimu_calibration.core.diagnosis.diagnose import climb  # noqa: E402
 from sdimu_calibration.core.estimation import free_inertial  # noqa: E402
 from sdimu_calibration.core.estimation.solve import solve  # noqa: E402
 from sdimu_calibration.core.evidence.signatures import Epochs, Regressors, constant_signatures, signatures  # noqa: E402
-from sdimu_calibration.core.filter.filter_pass import new_output  # noqa: E402
+from sdimu_calibration.core.filter import filter_pass  # noqa: E402
+from sdimu_calibration.core.filter.filter_pass import COPY, MEASURED, NAV, PassState, new_output  # noqa: E402
+from sdimu_calibration.core.filter.kalman import update  # noqa: E402
 from sdimu_calibration.core.live import LiveCalibration  # noqa: E402
 from sdimu_calibration.core.plan import Plan, Turn  # noqa: E402
 from sdimu_calibration.core.units import STANDARD_GRAVITY  # noqa: E402
@@ -44,15 +46,32 @@ REST_NS = np.arange(1, 401) * 100_000_000
 """Stamps of samples at rest (ns): 40 s at 10 Hz, enough to find the attitude and to filter."""
 
 
-def filter_loops() -> None:
-    """Let the filter of a running test take samples of a table at rest."""
+def at_rest() -> LiveCalibration:
+    """Begin a test whose table rests."""
     options = replace(opening_options("daejeon", load_imu("dtg"), Source()), stated=Stated(1.0, 1.0, 1, 1))
     live = LiveCalibration(options, load_model("baseline"))
     live.add_phase(0, True, 0)
-    live.add_samples(
-        REST_NS, np.full((len(REST_NS), 3), 4e-5), np.tile([0.0, 0.0, -STANDARD_GRAVITY], (len(REST_NS), 1))
-    )
-    live.advance(int(REST_NS[-1]), True)
+    rate, force = np.full((len(REST_NS), 3), 4e-5), np.tile([0.0, 0.0, -STANDARD_GRAVITY], (len(REST_NS), 1))
+    live.add_samples(REST_NS, rate, force)
+    return live
+
+
+def filter_loops() -> None:
+    """Let the filter of a running test take samples."""
+    at_rest().advance(int(REST_NS[-1]), True)
+
+
+def parts_of_the_pass() -> None:
+    """Call with zeros what the pass of the filter comes to last: the other process needs 20 s until then."""
+    p = 1
+    s = NAV + p + COPY
+    x, P, z, S = np.zeros(s), np.eye(s), np.zeros(MEASURED), np.eye(MEASURED)
+    settings = at_rest()._settings
+    state = PassState(x, P, np.eye(3), np.zeros(3), np.zeros(3), np.zeros(p))
+    _, H, R, M = filter_pass._measurement(settings, state, np.zeros((6, p)), np.zeros(6), 1.0, p, 1.0)
+    update(x, P, z, H, R, M)
+    filter_pass._feed_back(settings, state, p)
+    filter_pass._write(new_output(1, p, True, 1), 0, 0, z, S[:, 0], S)
 
 
 def without_a_pass() -> None:
@@ -72,6 +91,7 @@ def other_loops() -> None:
     site, imu, model = load_site("daejeon"), load_imu("dtg"), load_model("baseline")
     scenario = Scenario(PLAN, imu, site, seed=1)
     test = simulate_test(scenario)
+    parts_of_the_pass()
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         write_test(bag, scenario, test)
