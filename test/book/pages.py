@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import subprocess
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-
-from .warm import warm_program
 
 ROOT = Path(__file__).resolve().parents[2]
 DEADLINE_S = 580.0
@@ -20,7 +17,7 @@ _COMMAND = re.compile(r"^    (sdimu .*?)(?:\s+# .*)?$|^\|[^|]*\| `(sdimu [^`]*)`
 
 _PROGRAM = """#!/bin/sh
 said=$(mktemp)
-{program} "$@" 2>"$said"
+"{python}" -m sdimu_calibration.cli.main "$@" 2>"$said"
 status=$?
 cat "$said" >&2
 if [ $status -eq 3 ] && grep -q "^sdimu: not to be trusted: " "$said"; then status=0; fi
@@ -49,10 +46,8 @@ def commands(page: Path) -> list[str]:
     return [line or cell for line, cell in _COMMAND.findall(page.read_text(encoding="utf-8"))]
 
 
-def run(blocks: Iterable[Block], folder: Path, *, warm: bool = False) -> str:
+def run(blocks: Iterable[Block], folder: Path) -> str:
     """Run blocks one after the other; return what they printed.
-
-    With `warm`, commands of the shell are processes that need not load libraries (`warm.py`).
 
     Raises
     ------
@@ -61,15 +56,8 @@ def run(blocks: Iterable[Block], folder: Path, *, warm: bool = False) -> str:
     """
     tools = folder / "tools"
     tools.mkdir()
-    if warm:
-        with warm_program(tools) as words:
-            return _run(blocks, folder, tools, words)
-    return _run(blocks, folder, tools, [sys.executable, "-m", "sdimu_calibration.cli.main"])
-
-
-def _run(blocks: Iterable[Block], folder: Path, tools: Path, words: list[str]) -> str:
     program = tools / "sdimu"
-    program.write_text(_PROGRAM.format(program=shlex.join(words)), encoding="utf-8")
+    program.write_text(_PROGRAM.format(python=sys.executable), encoding="utf-8")
     program.chmod(0o755)
     environment = os.environ | {"PATH": f"{tools}:{os.environ['PATH']}", "COLUMNS": "80"}
     said = []
