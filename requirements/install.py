@@ -4,7 +4,8 @@
 
 On a new machine three things take their time: what is fetched and unpacked, modules that become bytecode, and loops
 that become machine code. The first waits for network and disk, the others for a processor, so they go on at once: the
-packages of ROS are fetched beside the others, and as soon as these are there, `kernels.py` compiles.
+packages of ROS are fetched beside the others, and as soon as these are there, `kernels.py` compiles, beyond the end of
+this script, too.
 """
 
 from __future__ import annotations
@@ -65,7 +66,34 @@ class Pip(Thread):
             self.status = pip.wait()
 
 
-def install(first: Sequence[str], then: Sequence[str]) -> int:
+class Loops:
+    """Compiles loops beside all else. What it does not come to, or fails at, is compiled when it is used first."""
+
+    def __init__(self) -> None:
+        self._parts: dict[Path, subprocess.Popen[bytes]] = {}
+
+    def start(self) -> None:
+        """Begin; nobody waits for the end."""
+        for part in ("filter", "others"):
+            said = Path(sys.prefix) / f".loops-{part}.log"
+            with said.open("wb") as file:
+                command = [sys.executable, str(FOLDER / "kernels.py"), part]
+                self._parts[said] = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=file)
+
+    def tell(self) -> None:
+        """Say what goes on, and what has failed so far: a failure is no reason not to install."""
+        for said, process in self._parts.items():
+            if process.poll():
+                lines = said.read_text(encoding="utf-8", errors="replace").splitlines() or [
+                    f"exit {process.returncode}"
+                ]
+                print(f"  loops are not compiled ahead ({lines[-1]}; {said}): their first use does so", flush=True)  # noqa: T201
+        going_on = sum(process.poll() is None for process in self._parts.values())
+        if going_on:
+            print("  numerical loops go on being compiled in the background", flush=True)  # noqa: T201
+
+
+def install(first: Sequence[str], then: Sequence[str], loops: Loops) -> int:
     """Install two lists of packages side by side, compile loops as soon as the first is there; return a status."""
     before, begun = present(), time.monotonic()
     pips = [Pip(first), Pip(then)]
@@ -78,7 +106,8 @@ def install(first: Sequence[str], then: Sequence[str]) -> int:
             time.sleep(0.1)
             if not compiling and not pips[0].is_alive():
                 compiling = True
-                start_kernels()
+                if not pips[0].status:
+                    loops.start()
         done = f"{sum(pip.fetched for pip in pips)} fetched, {present() - before} unpacked"
         print(f"  {done} of {len(first) + len(then)}, {time.monotonic() - begun:.0f} s", flush=True)  # noqa: T201
     for pip in pips:
@@ -88,15 +117,14 @@ def install(first: Sequence[str], then: Sequence[str]) -> int:
 
 
 def to_bytecode() -> None:
-    """Make bytecode of what is installed, on all cores: pip takes one, and the tests of numpy and scipy besides."""
-    tests = f"^{re.escape(str(PURELIB))}/.*/tests?/"
-    subprocess.run([sys.executable, "-m", "compileall", "-qq", "-j", "0", "-x", tests, str(PURELIB)], check=False)
+    """Make bytecode of what is installed, on all cores: pip takes one.
 
-
-def start_kernels() -> None:
-    """Begin to compile loops, beside all else; what it does not come to is compiled when it is used first."""
-    command = [sys.executable, str(FOLDER / "kernels.py")]
-    subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    Without what a run hardly reads: the tests of numpy and scipy, the installers, code for graphics cards, and grammars
+    of languages to be coloured.
+    """
+    unread = "|".join([".*/tests?", "pip", "setuptools", "pkg_resources", "numba/cuda", "pygments/(lexers|styles)"])
+    left_out = f"^{re.escape(str(PURELIB))}/({unread})/"
+    subprocess.run([sys.executable, "-m", "compileall", "-qq", "-j", "0", "-x", left_out, str(PURELIB)], check=False)
 
 
 def main(names: Sequence[str]) -> int:
@@ -104,9 +132,11 @@ def main(names: Sequence[str]) -> int:
     wanted = [entry for name in names for entry in entries(name)]
     print(f"installing {len(wanted)} packages ({', '.join(names)}) into {sys.prefix}", flush=True)  # noqa: T201
     ros = [entry for entry in wanted if entry.startswith(ROS)]
-    status = install([entry for entry in wanted if entry not in ros], ros)
+    loops = Loops()
+    status = install([entry for entry in wanted if entry not in ros], ros, loops)
     if not status:
         to_bytecode()
+        loops.tell()
     return status
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import subprocess
 import sys
 from importlib.metadata import requires
@@ -61,15 +62,47 @@ def test_what_setup_asks_for_is_in_its_file_or_in_what_is_installed_before(name)
 def test_loops_are_compiled_before_ros_is_there():
     """requirements/install.py fetches the packages of ROS beside the others, and compiles when these are there."""
     script = ROOT / "requirements" / "kernels.py"
-    code = f"import runpy, sys; runpy.run_path({str(script)!r}); print('rclpy' in sys.modules)"
+    code = f"""
+import runpy, sys
+kernels = runpy.run_path({str(script)!r})
+from sdimu_calibration.core.evidence import signatures
+from sdimu_calibration.core.filter import filter_pass, kalman
+from sdimu_calibration.storage.files import journal_walk
+loops = [signatures._signatures, signatures._constant_signatures, journal_walk._walk]
+loops += [filter_pass._measurement, filter_pass._feed_back, filter_pass._write, kalman.update]
+loops.append(kernels["free_inertial"]._navigate)
+kernels["parts_of_the_pass"]()
+kernels["without_a_pass"]()
+called = [len(loop.signatures) for loop in loops]
+kernels["other_loops"]()
+print("rclpy" in sys.modules, called, [len(loop.signatures) for loop in loops])
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "False", done.stderr
+    # What is called with zeros is what a fit and a diagnosis call: the same types.
+    assert done.stdout.strip() == f"False {[1] * 8} {[1] * 8}", done.stderr
     first = {
         entry.partition("==")[0] for entry in entries("run") if not entry.startswith("ros-") and " ; " not in entry
     }
     assert {"numba", "numpy", "scipy", "pydantic", "pyyaml"} <= first
     for name in sorted(first):
         assert not [text for text in requires(name) or [] if text.startswith("ros-")], name
+
+
+def test_loops_that_are_not_compiled_ahead_are_told_and_break_no_installation(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    (tmp_path / "kernels.py").write_text("raise ImportError('no numba here')")
+    script = runpy.run_path(str(ROOT / "requirements" / "install.py"))
+    monkeypatch.setitem(script["Loops"].start.__globals__, "FOLDER", tmp_path)
+    loops = script["Loops"]()
+    loops.start()
+    for process in loops._parts.values():
+        process.wait(60)
+    loops.tell()
+    told = capsys.readouterr().out.splitlines()
+    assert len(told) == 2
+    for line, part in zip(told, ("filter", "others"), strict=True):
+        assert "not compiled ahead (ImportError: no numba here" in line
+        assert (tmp_path / f".loops-{part}.log").is_file()
 
 
 TOOLS = {

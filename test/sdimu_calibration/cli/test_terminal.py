@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
+from sdimu_calibration.cli import main as cli
 from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.core.advice import Advice, Kind, Verb
@@ -42,6 +47,26 @@ class Terminal:
     folder: Path
 
     def __call__(self, *arguments: object, terminal: bool = False) -> subprocess.CompletedProcess[str]:
+        """Run the program in this process: its entry, its environment and its streams, without loading numba anew."""
+        words, out, err, before = ["sdimu", *map(str, arguments)], StringIO(), StringIO(), Path.cwd()
+        status = 0
+        with (
+            mock.patch.dict(os.environ, self.environment(terminal), clear=True),
+            mock.patch.object(sys, "argv", words),
+            redirect_stdout(out),
+            redirect_stderr(err),
+        ):
+            os.chdir(self.folder)
+            try:
+                cli.main()
+            except SystemExit as ending:
+                status = int(ending.code or 0)
+            finally:
+                os.chdir(before)
+        return subprocess.CompletedProcess(words, status, out.getvalue(), err.getvalue())
+
+    def outside(self, *arguments: object, terminal: bool = False) -> subprocess.CompletedProcess[str]:
+        """Run the program as a process of its own."""
         return subprocess.run(
             [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)],
             cwd=self.folder,
@@ -54,8 +79,6 @@ class Terminal:
 
     @staticmethod
     def environment(terminal: bool) -> dict[str, str]:
-        import os
-
         kept = {k: v for k, v in os.environ.items() if k not in {"NO_COLOR", "FORCE_COLOR", "TERM"}}
         return kept | {"COLUMNS": str(WIDTH), "TTY_COMPATIBLE": "1" if terminal else "0", "TERM": "xterm"}
 
@@ -145,21 +168,29 @@ def test_a_verb_answers_in_json_alone_as_its_file_does_and_speaks_plainly_beside
     assert all(len(line) <= WIDTH for line in rules)
 
 
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_process_of_its_own_says_the_same(sdimu, terminal):
+    asked = ("calibrate", "bag1", "--imu", "dtg", "--out", "alone")
+    here, outside = sdimu(*asked, terminal=terminal), sdimu.outside(*asked, terminal=terminal)
+    assert outside.stdout == here.stdout
+    assert (outside.returncode, outside.stderr) == (here.returncode, here.stderr)
+
+
 def test_a_pipe_gets_words_without_colour(sdimu):
-    done = sdimu("compare", "results/base1", "diagnosis")
+    done = sdimu.outside("compare", "results/base1", "diagnosis")
     assert done.returncode == 0
     assert EFFECT in done.stdout
     assert "\x1b" not in done.stdout + done.stderr
 
 
 def test_help_of_every_verb_fits_and_stands_in_the_order_of_work(sdimu):
-    words = sdimu("--help").stdout
+    words = sdimu.outside("--help").stdout
     panels = ("Simulate and record", "Calibrate", "Diagnose", "Plan", "Use", "Study")
     places = [words.index(f"─ {panel} ─") for panel in panels]
     assert places == sorted(places)
     verbs = re.findall(r"^│ ([a-z][a-z-]*) ", words, re.MULTILINE)
     assert verbs.index("simulate") < verbs.index("calibrate") < verbs.index("diagnose") < verbs.index("compensate")
-    for text in (words, *(sdimu(verb, "--help").stdout for verb in ("calibrate", "diagnose", "plan"))):
+    for text in (words, *(sdimu.outside(verb, "--help").stdout for verb in ("calibrate", "diagnose", "plan"))):
         assert max(map(len, text.splitlines())) <= WIDTH
         assert "…" not in text
 

@@ -102,6 +102,13 @@ def _collect(content: Bytes, at: int, ns: Bytes, omega: Bytes, force: Bytes, sta
         at += length
 
 
+def _as_read(content: Bytes) -> Bytes:
+    """Return the same bytes as may not be written: numba compiles a loop anew for those that may."""
+    view = content.view()
+    view.flags.writeable = False
+    return view
+
+
 def walk(content: Bytes, at: int) -> tuple[int, Counts]:
     """Find the end of the last whole record (a byte's place) and count what is before it.
 
@@ -111,7 +118,7 @@ def walk(content: Bytes, at: int) -> tuple[int, Counts]:
     at : int
         Place of the first record.
     """
-    end, *counts = _walk(content, at, _TABLE)
+    end, *counts = _walk(_as_read(content), at, _TABLE)
     return int(end), Counts(*map(int, counts))
 
 
@@ -128,7 +135,7 @@ def raw_test(content: Bytes, at: int) -> RawTest:
     ns, omega, force = (np.empty((counts.samples, width), np.uint8) for width in (8, 24, 24))
     status = np.empty((counts.statuses, STATUS), np.uint8)
     temperature = np.empty((counts.temperatures, TEMPERATURE), np.uint8)
-    _collect(content, at, ns, omega, force, status, temperature)
+    _collect(_as_read(content), at, ns, omega, force, status, temperature)
     said, warm = status.view("<i8"), temperature.view("<i8")
     return RawTest(
         ns.view("<i8")[:, 0],
