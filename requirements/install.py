@@ -47,11 +47,13 @@ class Pip(Thread):
         self._wanted = wanted
         self.said: list[str] = []
         self.fetched = 0
-        self.status = 0
+        # Until pip has said otherwise: what ends before is no success.
+        self.status = 1
 
     def run(self) -> None:
         """Install, and count what is fetched."""
         if not self._wanted:
+            self.status = 0
             return
         with tempfile.TemporaryDirectory() as folder:
             names = Path(folder) / "wanted.txt"

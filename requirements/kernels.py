@@ -18,9 +18,9 @@ from types import SimpleNamespace
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src" / name) for name in ("sdimu_calibration", "rate_table_sim", "sdimu_sim")]
 
+import sdimu_calibration  # noqa: E402, F401, I001  (before numpy: one thread of linear algebra)
 import numpy as np  # noqa: E402
 
-import sdimu_calibration  # noqa: E402, F401  (before numpy: one thread of linear algebra)
 from sdimu_calibration.core.data.axes_and_units import Stated  # noqa: E402
 from sdimu_calibration.core.diagnosis.diagnose import climb  # noqa: E402
 from sdimu_calibration.core.estimation import free_inertial  # noqa: E402

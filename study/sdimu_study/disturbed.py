@@ -18,7 +18,7 @@ from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.score import scored
-from sdimu_study.study import Key, Study, largest_z, of, rms_cell
+from sdimu_study.study import Group, Key, Study, largest_z, of, rms_cell
 from sdimu_study.worlds import (
     OneTest,
     diagnosed,
@@ -87,7 +87,7 @@ def told_wrong(site: Site, latitude_deg: float, gravity_mgal: float) -> Site:
 
 
 def shaken(recording: Recording, size_arcsec: float, hertz: float, axis: Floats) -> Recording:
-    """Put a recording on a table that swings about an axis; rates and forces are means over the samples, exactly.
+    """Put a recording on a table that swings about an axis, to first order in the angle; rates and forces are means.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ STUDY = Study(
     (
         ("disturbance", lambda g: g.key[0]),
         ("runs", lambda g: str(len(g.rows))),
-        ("hidden effect named", lambda g: of(g.count(lambda r: r.get("in_class")), g.good) if _hidden(g.key) else ""),
+        ("hidden effect named", lambda g: of(g.count(lambda r: r.get("in_class")), g.good) if _hidden(g) else ""),
         ("another effect named", lambda g: str(g.count(_other))),
         ("refused", lambda g: str(len(g.rows) - len(g.good))),
         ("RMS z", lambda g: rms_cell(g.good)),
@@ -128,8 +128,8 @@ STUDY = Study(
 )
 
 
-def _hidden(key: Key) -> bool:
-    return key[0].endswith(BESIDE)
+def _hidden(group: Group) -> bool:
+    return group.key[0].endswith(BESIDE)
 
 
 def _other(row: Any) -> bool:

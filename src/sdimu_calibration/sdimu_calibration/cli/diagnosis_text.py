@@ -186,7 +186,7 @@ def _possible(console: Console, summary: DiagnosisSummary) -> None:
         line(console, f"possible, and not told: {', '.join(possible[:_TOP])}")
     known = {(term.triad, term.kind) for term in summary.diagnosis.found.noise}
     noise = [
-        f"{NoiseTerm(n.triad, n.kind).words} {in_percent(n.probability)}"
+        f"{NoiseTerm(n.triad, n.kind, axes=n.axes).words} {in_percent(n.probability)}"
         for n in told.noise
         if n.probability >= POSSIBLE and (n.triad, n.kind) not in known
     ]

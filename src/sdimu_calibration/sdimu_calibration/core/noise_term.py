@@ -82,7 +82,7 @@ class NoiseTerm:
     @property
     def where(self) -> str:
         """Name of the triad, or of its sensors that have the noise."""
-        return self.triad if self.axes == AXES else f"{self.triad} {' and '.join('xyz'[axis] for axis in self.axes)}"
+        return sensors_of(self.triad, self.axes)
 
     @property
     def is_drawn(self) -> bool:
@@ -104,3 +104,8 @@ class NoiseTerm:
     def display_unit(self) -> str:
         """Unit in which people read the size."""
         return ("deg/h" if self.triad == "gyro" else "ug") + ("/sqrt(h)" if self.kind == RANDOM_WALK else "")
+
+
+def sensors_of(triad: str, axes: tuple[int, ...]) -> str:
+    """Name some sensors of a triad; the triad where it is all of them."""
+    return triad if axes == AXES else f"{triad} {' and '.join('xyz'[axis] for axis in axes)}"

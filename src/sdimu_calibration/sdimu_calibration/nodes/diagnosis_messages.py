@@ -125,7 +125,7 @@ def _odds(told: Probabilities) -> Iterable[tuple[str, str]]:
         for member in family.members:
             yield member.label, repr(member.probability)
     for noise in told.noise:
-        yield f"noise {noise.triad} {noise.kind}", repr(noise.probability)
+        yield f"noise {noise.where} {noise.kind}", repr(noise.probability)
 
 
 def _folded(told: Probabilities) -> Iterable[tuple[str, str]]:

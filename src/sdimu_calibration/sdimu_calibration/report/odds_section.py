@@ -94,7 +94,7 @@ def _size(member: MemberShare) -> str:
 
 
 def _noise(noise: NoiseShare) -> str:
-    size = NoiseTerm(noise.triad, noise.kind, 0.0, noise.size)
+    size = NoiseTerm(noise.triad, noise.kind, size=noise.size, axes=noise.axes)
     amount = f"{from_si(noise.size, size.display_unit):.3g} {size.display_unit}"
     return f"Noise: {size.words}, {amount}"
 

@@ -16,7 +16,11 @@ from sdimu_calibration.report.markup import Draw, quiet, section
 _AXES = "xyz"
 _UNITS = {"gyro": "deg/h", "accel": "ug"}
 _FOLLOWED = {
-    ATTITUDE: ("force along {} (g)", 1.0, "at rest, against the share of gravity along each body axis"),
+    ATTITUDE: (
+        "force along {} (g)",
+        1.0,
+        "at rest (filled) and in turns (open), against the share of gravity along each body axis",
+    ),
     RATE: ("rate about {} (deg/s)", float(np.degrees(1.0)), "in turns, against the rate about each body axis"),
     TEMPERATURE: ("temperature over T0 (K)", 1.0, "at rest, against the temperature"),
 }
@@ -49,7 +53,8 @@ def followed(found: UnknownFunction) -> Figure:
     """Error of each sensor that has it against each component of what it follows, a panel each."""
     unit = _UNITS[found.triad]
     title, factor, _ = _FOLLOWED[found.follows]
-    at = found.turning if found.follows == RATE else ~found.turning
+    at = {RATE: found.turning, TEMPERATURE: ~found.turning}.get(found.follows, np.ones(len(found.turning), dtype=bool))
+    symbols = np.where(found.turning[at] & (found.follows == ATTITUDE), "circle-open", "circle").tolist()
     columns = found.variable.shape[1]
     figure = Figure(rows=len(found.axes), cols=columns, share_x=True, share_y=True, gap_x=0.03, gap_y=0.05)
     for row, axis in enumerate(found.axes):
@@ -63,7 +68,7 @@ def followed(found: UnknownFunction) -> Figure:
                 mode="markers",
                 showlegend=False,
                 error_y={"array": band, "color": MUTED, "thickness": 1, "width": 0},
-                marker={"color": f"@{_AXES[axis]}", "size": 6},
+                marker={"color": f"@{_AXES[axis]}", "size": 6, "symbol": symbols},
                 hovertemplate=f"{found.triad} {_AXES[axis]}: %{{y:.3g}} {unit}<extra></extra>",
                 row=row + 1,
                 col=col + 1,

@@ -10,6 +10,7 @@ import pytest
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.noise_term import ATTITUDE, RATE
+from sdimu_calibration.core.posterior.told import probabilities
 from sdimu_calibration.core.posterior.unknown import unknown_functions
 
 UG = 9.80665e-6
@@ -72,6 +73,16 @@ def test_an_error_of_one_sensor_is_told_of_that_sensor_alone(bench):
     assert one.sigma[:, 1].min() > 0.0
     np.testing.assert_array_equal(one.mean[:, [0, 2]], 0.0)
     assert not len(found.chosen)
+
+
+def test_errors_of_two_sensors_are_told_of_these_two(bench):
+    """Of all three they are likelier than of one: the search must not stay there."""
+    found, _, _ = with_function(bench, ATTITUDE, slice(3, 5), 25.0 * UG)
+    (term,) = found.noise
+    assert (term.where, term.kind) == ("accel x and y", ATTITUDE)
+    (told,) = [noise for noise in probabilities(found.posterior, found.noise).noise if noise.kind == ATTITUDE]
+    assert (told.where, told.axes) == ("accel x and y", (0, 1))
+    assert told.probability > 0.95
 
 
 def test_white_noise_has_none(bench):

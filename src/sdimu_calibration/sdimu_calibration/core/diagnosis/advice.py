@@ -115,7 +115,8 @@ def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
     worst = d.consistency.where[0] if d.consistency.where else None
     place = (worst.stop, worst.channel) if worst else (None, "")
     out = [Advice(Kind.UNKNOWN_CAUSE, (*place, bool(d.found.noise))), Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)]
-    return out + ([Advice(Kind.TRY_EQUATION, tuple(f.candidate.label for f in found))] if found else [])
+    near = tuple(f.candidate.label for f in found if not f.decided)
+    return out + ([Advice(Kind.TRY_EQUATION, near)] if near else [])
 
 
 def add(found: Sequence[Found]) -> list[Advice]:

@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.step import Step, step_of
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike, with_intervals
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import FOLLOWS, KINDS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior
 
@@ -161,9 +161,22 @@ def told_effects(found: Posterior[E]) -> list[int]:
 
 
 def told_noise(found: Posterior[E]) -> tuple[NoiseTerm, ...]:
-    """Noise that is told: of triads where it is nearly certain, as the told model has it."""
-    terms = [t for t in found.told.noise.terms if found.of_noise(t.triad) > CERTAIN_NOISE]
-    return tuple(sorted(terms, key=lambda t: TRIADS.index(t.triad)))
+    """Noise that is told: of triads where it is nearly certain, as the told model has it.
+
+    What wanders beside a certain function of what is known is told where it is certain by itself.
+    """
+    out: list[NoiseTerm] = []
+    for triad in TRIADS:
+        own = [t for t in found.told.noise.terms if t.triad == triad]
+        if own and found.of_noise(triad) > CERTAIN_NOISE:
+            sure = [t for t in own if found.of_noise(triad, _sort(t)) > CERTAIN_NOISE]
+            out += sure or own
+    return tuple(out)
+
+
+def _sort(term: NoiseTerm) -> list[str]:
+    """Kinds of noise that follow something, or those that do not: whichever a term is of."""
+    return [kind for kind in KINDS if (kind in FOLLOWS) == (term.kind in FOLLOWS)]
 
 
 def in_noise(board: Board[E], terms: Sequence[NoiseTerm]) -> E:

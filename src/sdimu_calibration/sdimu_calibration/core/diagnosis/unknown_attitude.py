@@ -17,7 +17,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander, given_terms, sizes_on_grid
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import ONE_OR_ALL
+from sdimu_calibration.core.posterior.noise_models import SENSORS
 
 _GAIN = 4.0
 """Log-likelihood (1) from which functions of the attitude are looked at: their odds make up for as much."""
@@ -64,6 +64,6 @@ def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequenc
             1
         ]
         for t in TRIADS
-        for axes in ONE_OR_ALL
+        for axes in SENSORS
     ]
     return float(np.max(np.concatenate(gains), initial=0.0))

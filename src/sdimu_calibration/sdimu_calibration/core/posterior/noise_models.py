@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, product, repeat
+from itertools import chain, combinations, product, repeat
 
 import numpy as np
 
@@ -86,8 +86,8 @@ _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
-ONE_OR_ALL = (AXES, *((axis,) for axis in AXES))
-"""Sensors of a triad that an unknown function is of, likely alike: what causes it is of one sensor or of all."""
+SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count))
+"""Sensors of a triad that an unknown function may be of, likely alike: nobody knows what causes it."""
 
 
 @dataclass(frozen=True)
@@ -176,11 +176,11 @@ class _Search:
     ) -> None:
         self.information, self.cut, self.usual = information, cut, usual
         follows = () if cut.conditions is None else cut.conditions.followed
-        unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in ONE_OR_ALL]
+        unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in SENSORS]
         every = [*kinds(cut), *unknown]
         self.tried = every if tried is None else list(tried)
         markov = sum(t.kind == MARKOV for t in every) // len(TRIADS)
-        variants = {MARKOV: markov, **dict.fromkeys(FOLLOWS, len(ONE_OR_ALL))}
+        variants = {MARKOV: markov, **dict.fromkeys(FOLLOWS, len(SENSORS))}
         self.log_odds = {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
         self.seen: dict[frozenset[Identity], _Found] = {}
 
@@ -208,9 +208,11 @@ class _Search:
 
     def _hopeless(self, term: NoiseTerm) -> bool:
         """Whether a term was far behind the best one of its triad alone: the other triad changes little of that."""
-        alone = {next(iter(kinds)): found.score for kinds, found in self.seen.items() if len(kinds) == 1}
-        best = max((score for (triad, *_), score in alone.items() if triad == term.triad), default=-np.inf)
-        return alone.get(term.identity, -np.inf) < best - _HOPELESS
+        alone = [(next(iter(kinds)), found.score) for kinds, found in self.seen.items() if len(kinds) == 1]
+        of_triad = [(known, score) for known, score in alone if known[0] == term.triad]
+        # In any sensors: which of them have it shows beside noise of the other triad.
+        own = max((score for known, score in of_triad if known[:3] == term.identity[:3]), default=-np.inf)
+        return own < max((score for _, score in of_triad), default=-np.inf) - _HOPELESS
 
     def sized(self, J: Floats, d: Floats, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
         """Best size of a term, and the log of its odds with the share of the sizes that the likelihood leaves."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.noise_term import AXES, NoiseTerm, sensors_of
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
 
@@ -82,6 +82,8 @@ class NoiseShare:
         Geometric mean over these models (SI, `unit`).
     low, high : float
         Ends of the interval of 95 % where the noise is told; NaN elsewhere.
+    axes : tuple of int
+        Sensors of the triad that have it: all but of an unknown function, which may be of some.
     """
 
     triad: str
@@ -91,6 +93,12 @@ class NoiseShare:
     low: float
     high: float
     unit: str
+    axes: tuple[int, ...] = AXES
+
+    @property
+    def where(self) -> str:
+        """Name of the triad, or of its sensors that have the noise."""
+        return sensors_of(self.triad, self.axes)
 
 
 @dataclass(frozen=True)
@@ -184,19 +192,20 @@ def _sizes(found: Posterior[E]) -> dict[int, tuple[float, float]]:
 def _noise(found: Posterior[E], told: Sequence[NoiseTerm]) -> tuple[NoiseShare, ...]:
     total: dict[str, float] = {}
     for noise, p in found.noises:
-        for name in {f"{t.triad} {t.kind}" for t in noise.terms}:
+        for name in set(map(_kind, noise.terms)):
             total[name] = min(total.get(name, 0.0) + p, 1.0)
-    interval: dict[str, tuple[float, float]] = {}
-    for t in told:
-        low, high = interval.get(name := f"{t.triad} {t.kind}", (t.low, t.high))
-        interval[name] = min(low, t.low), max(high, t.high)
+    interval = {_kind(t): (t.low, t.high) for t in told}
     out = []
     for name, share in sorted(total.items(), key=lambda item: (-item[1], item[0])):
         if share < LEAST:
             continue
-        have = [(p, t) for noise, p in found.noises for t in noise.terms if f"{t.triad} {t.kind}" == name]
+        have = [(p, t) for noise, p in found.noises for t in noise.terms if _kind(t) == name]
         size = float(np.exp(sum(p * np.log(t.size) for p, t in have) / sum(p for p, _ in have)))
         term = have[0][1]
         low, high = interval.get(name, (float("nan"), float("nan")))
-        out.append(NoiseShare(term.triad, term.kind, share, size, low, high, term.unit))
+        out.append(NoiseShare(term.triad, term.kind, share, size, low, high, term.unit, term.axes))
     return tuple(out)
+
+
+def _kind(term: NoiseTerm) -> str:
+    return f"{term.where} {term.kind}"

@@ -183,7 +183,8 @@ def bag_parts(path: Path) -> list[Path]:
     if len(named) > len(files):
         _present(named)
     if not files:
-        raise DataError(f"{path}: not a bag (no metadata.yaml and no .mcap file in the folder)")
+        listed = "a metadata.yaml that names no file" if information else "no metadata.yaml"
+        raise DataError(f"{path}: not a bag ({listed}, and no .mcap file in the folder)")
     return files
 
 

@@ -233,7 +233,7 @@ def odds(told: Probabilities | None) -> Row:
             entry(family, "family sensor p=probability", members=[entry(one, member) for one in family.members])
             for family in told.families
         ],
-        "noise": [entry(noise, "triad kind p=probability size low high unit") for noise in told.noise],
+        "noise": [entry(noise, "triad kind axes p=probability size low high unit") for noise in told.noise],
     }
 
 
