@@ -15,11 +15,7 @@ VARIABLE = {
     RATE: np.radians(np.arange(12.0)).reshape(4, 3),
     TEMPERATURE: np.arange(4.0)[:, None],
 }
-SHOWN = {
-    ATTITUDE: VARIABLE[ATTITUDE][~TURNING],
-    RATE: np.arange(12.0).reshape(4, 3)[TURNING],
-    TEMPERATURE: [[0.0], [2.0]],
-}
+SHOWN = {ATTITUDE: VARIABLE[ATTITUDE], RATE: np.arange(12.0).reshape(4, 3)[TURNING], TEMPERATURE: [[0.0], [2.0]]}
 
 
 @pytest.mark.parametrize("kind", [ATTITUDE, RATE, TEMPERATURE])
@@ -27,7 +23,7 @@ def test_each_axis_is_drawn_against_each_component_in_customary_units(kind):
     mean = np.arange(12.0).reshape(4, 3)
     figure = followed(UnknownFunction("gyro", kind, VARIABLE[kind], TURNING, np.radians(mean) / 3600.0, 0.0 * mean))
     traces = figure.as_plotly().data
-    at = TURNING if kind == RATE else ~TURNING
+    at = {ATTITUDE: TURNING | True, RATE: TURNING, TEMPERATURE: ~TURNING}[kind]
     columns = VARIABLE[kind].shape[1]
     assert len(traces) == 3 * columns
     for k, trace in enumerate(traces):
@@ -42,4 +38,5 @@ def test_only_the_sensors_that_have_it_are_drawn():
     assert len(figure.data) == 3
     assert figure.layout.yaxis.title.text == "accel y (ug)"
     for trace in figure.data:
-        np.testing.assert_allclose(trace.y, mean[~TURNING, 1] / 9.80665e-6)
+        np.testing.assert_allclose(trace.y, mean[:, 1] / 9.80665e-6)
+        assert list(trace.marker.symbol) == ["circle", "circle-open", "circle", "circle-open"]
