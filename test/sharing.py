@@ -28,14 +28,18 @@ TOGETHER = {
 """Files that go to the worker of another one, with which they share a whole run over DDS."""
 
 LONGEST = (
+    "test/browser/test_workbench_in_a_browser.py",
     "test/book/test_blocks.py",
     "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
     "test/sdimu_calibration/core/joint/test_set_search.py",
     "test/sdimu_calibration/report/workbench/test_workbench.py",
-    "test/sdimu_calibration/cli/test_terminal.py",
+    "test/browser/test_report_in_a_browser.py",
+    "test/browser/test_live_page_in_a_browser.py",
+    "test/browser/test_fleet_in_a_browser.py",
     "test/sdimu_calibration/core/diagnosis/test_effects_in_noise.py",
     "test/sdimu_calibration/core/batch/test_batch.py",
     "test/sdimu_calibration/core/estimation/test_every_estimator.py",
+    "test/sdimu_calibration/cli/test_terminal.py",
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py",
     "test/recovery/test_faults.py",
     "test/recovery/test_grades.py",
