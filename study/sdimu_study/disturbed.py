@@ -33,6 +33,8 @@ from sdimu_study.worlds import (
     with_effects,
 )
 
+_IMU = "dtg"
+"""IMU file on every bench: its sigmas are small enough that a site and a table show."""
 SITES = {"latitude .1 deg": (0.1, 0.0), "latitude .5 deg": (0.5, 0.0), "gravity 100 mgal": (0.0, 100.0)}
 """By how much the site that is told is wrong: deg, mgal. The site states that as its sigma."""
 VIBRATIONS = {f"{size} arcsec, {hertz} Hz": (size, hertz) for size in (2.0, 1.0, 0.5) for hertz in (17.0, 31.0, 44.0)}
@@ -51,18 +53,18 @@ CASES: dict[Key, Key] = {(k,): (k,) for k in (*(s + b for s in SITES for b in ("
 """Every disturbance once."""
 
 
-def world(case: Key, seed: int, imu_name: str = "dtg") -> OneTest:
+def world(case: Key, seed: int) -> OneTest:
     """Simulate a test with a disturbance."""
     (name,) = case
     kind, beside, _ = name.partition(BESIDE)
-    rng, imu, rate_hz = rng_of(seed, "disturbed", name), load_imu(imu_name), _RATE_HZ.get(kind, _SLOW_HZ)
+    rng, imu, rate_hz = rng_of(seed, "disturbed", name), load_imu(_IMU), _RATE_HZ.get(kind, _SLOW_HZ)
     plan, site = drawn_place(rng)
     told, axis, sign = site, rng.standard_normal(3), float(rng.choice((-1.0, 1.0)))
     if kind in SITES:
         told = told_wrong(site, *(sign * size for size in SITES[kind]))
 
     def undisturbed() -> tuple[PreparedTest, ImuTruth]:
-        return simulated_test(imu_name, imu, plan, site, seed, (), (), rate_hz)
+        return simulated_test(_IMU, imu, plan, site, seed, (), (), rate_hz)
 
     def simulated(effects: tuple[str, ...]) -> tuple[PreparedTest, ImuTruth]:
         recording, sensor = simulated_recording(imu, plan, site, seed, effects, (), rate_hz)
@@ -86,17 +88,20 @@ def told_wrong(site: Site, latitude_deg: float, gravity_mgal: float) -> Site:
     return replace(site, gravity_m_s2=normal + gravity, gravity_sigma_m_s2=abs(gravity))
 
 
-def shaken(recording: Recording, size_arcsec: float, hertz: float, axis: Floats) -> Recording:
+def shaken(recording: Recording, size_arcsec: float | Floats, hertz: float, axis: Floats) -> Recording:
     """Put a recording on a table that swings about an axis, to first order in the angle; rates and forces are means.
 
     Parameters
     ----------
-    size_arcsec, hertz : float
-        Amplitude (arcsec) and frequency (Hz).
+    size_arcsec : float or ndarray, shape (n,)
+        Amplitude (arcsec), one for all samples or of each.
+    hertz : float
+        Frequency (Hz).
     axis : ndarray, shape (3,)
         In b, of unit length (1).
     """
-    t, dt, w, a = recording.t, recording.interval_s, 2.0 * math.pi * hertz, to_si(size_arcsec, "arcsec")
+    t, dt, w = recording.t, recording.interval_s, 2.0 * math.pi * hertz
+    a = to_si(1.0, "arcsec") * np.asarray(size_arcsec)
     rate = (a * (np.sin(w * t) - np.sin(w * (t - dt))) / dt)[:, None] * axis
     angle = (a * (np.cos(w * (t - dt)) - np.cos(w * t)) / (w * dt))[:, None] * axis
     return replace(

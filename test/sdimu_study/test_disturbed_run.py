@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
-from sdimu_study.disturbed import CASES, STUDY, shaken, told_wrong
+from sdimu_study.disturbed import STUDY, shaken, told_wrong
 
 SITE = Site(np.radians(40.0), 0.0)
 
@@ -34,12 +34,8 @@ def test_a_table_that_vibrates_swings_by_its_amplitude_and_tilts_gravity():
     assert np.abs(moved.f_ib_b[:, 1]).max() == pytest.approx(9.8 * 0.95 * to_si(2.0, "arcsec"), rel=0.02)
 
 
-def test_every_disturbance_is_a_case():
-    assert len(CASES) == 16
-    assert len(set(CASES.values())) == 16
-
-
 def test_an_effect_beside_a_wrong_latitude_is_named_with_honest_coefficients():
     row = STUDY.of(("latitude .5 deg, an effect",))(114_001)
     assert row["in_class"]
+    # Some thirty errors over sigma: their root scatters by an eighth about one.
     assert (row["z2"] / row["count"]) ** 0.5 < 1.6

@@ -61,7 +61,7 @@ class NoiseTerm:
         Kinds that the data cannot tell from it.
     axes : tuple of int
         Sensors of the triad that have it, each a draw of its own, ascending: all but of an unknown function, which may
-        be of one.
+        be of some.
     """
 
     triad: str

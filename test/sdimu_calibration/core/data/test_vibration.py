@@ -17,6 +17,7 @@ from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_study import disturbed
 from sdimu_study.score import baseline_z
 
 IMU, MODEL, SITE = load_imu("dtg"), load_model("baseline"), Site(float(np.radians(36.4)), 80.0)
@@ -32,18 +33,10 @@ def recorded():
 
 
 def shaken(recording, arcsec, hertz, only=slice(None)):
-    """The recording on a table whose angle swings; rates and forces are means over the samples, exactly."""
-    t, a, w = recording.t, to_si(arcsec, "arcsec"), 2.0 * np.pi * hertz
-    dt = recording.interval_s
-    swing = np.zeros(len(t))
-    swing[only] = a
-    rate = (swing * (np.sin(w * t) - np.sin(w * (t - dt))) / dt)[:, None] * AXIS
-    angle = (swing * (np.cos(w * (t - dt)) - np.cos(w * t)) / (w * dt))[:, None] * AXIS
-    return replace(
-        recording,
-        omega_ib_b=recording.omega_ib_b + rate - np.cross(angle, recording.omega_ib_b),
-        f_ib_b=recording.f_ib_b - np.cross(angle, recording.f_ib_b),
-    )
+    """The recording on a table that swings about an axis, all the time or in some samples."""
+    swing = np.zeros(len(recording.t))
+    swing[only] = arcsec
+    return disturbed.shaken(recording, swing, hertz, AXIS)
 
 
 @cache

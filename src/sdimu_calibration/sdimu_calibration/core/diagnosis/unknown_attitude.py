@@ -49,7 +49,7 @@ def with_attitude_functions(request: Request, found: Search[LinearEvidence]) -> 
 
 
 def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequence[NoiseTerm]) -> float:
-    """Log-likelihood that an error which follows the attitude adds in the sensor or triad that shows it best (1).
+    """Log-likelihood that an error which follows the attitude adds in the sensors that show it best (1).
 
     Parameters
     ----------
@@ -59,11 +59,8 @@ def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequenc
         Noise of the model.
     """
     information = Joint.of(known, wander).on_wander(np.arange(len(weight)), weight)
-    gains = [
-        sizes_on_grid(*given_terms(information, wander.cut, beside, t), wander.cut, NoiseTerm(t, ATTITUDE, axes=axes))[
-            1
-        ]
-        for t in TRIADS
-        for axes in SENSORS
-    ]
+    gains = []
+    for triad in TRIADS:
+        given = given_terms(information, wander.cut, beside, triad)
+        gains += [sizes_on_grid(*given, wander.cut, NoiseTerm(triad, ATTITUDE, axes=axes))[1] for axes in SENSORS]
     return float(np.max(np.concatenate(gains), initial=0.0))

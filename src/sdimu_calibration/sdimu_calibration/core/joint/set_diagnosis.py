@@ -102,7 +102,8 @@ class SetDiagnosis:
     recurrence : Recurrence or None
         What comes back of that what the model leaves in the stops; None where it leaves nothing.
     refused : tuple of SetFinding
-        Effects that were found and taken back, as recordings held out fit worse with them.
+        Effects that were found and taken back: recordings held out fit worse with them, or an unknown function of the
+        attitude explains them.
     probabilities : Probabilities or None
         Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
         function of the attitude explains what is left, which the search did not know.

@@ -12,9 +12,7 @@ _ROUNDING = 1e-6
 
 
 @compiled
-def odds_beside(
-    log_odds: Floats, alike: Ints, repeats: Bools, positions: Ints, counted: Floats, kin: float, most_drifts: int
-) -> Floats:
+def odds_beside(log_odds: Floats, alike: Ints, repeats: Bools, members: Ints, kin: float, most_drifts: int) -> Floats:
     """Log odds of each of q candidates beside those of a model.
 
     Parameters
@@ -25,10 +23,8 @@ def odds_beside(
         Numbers that candidates share: parameter, twin, cause, and the axis of a drift (-1 of what is none).
     repeats : ndarray of bool, shape (q,)
         Whether a model may have several variants of the parameter.
-    positions : ndarray of int, shape (k,)
+    members : ndarray of int, shape (k,)
         Candidates of the model.
-    counted : ndarray, shape (q,)
-        Is filled with the result.
     kin : float
         Log odds of what has a cause that the model has (1).
     most_drifts : int
@@ -37,16 +33,17 @@ def odds_beside(
     Returns
     -------
     ndarray, shape (q,)
-        `counted`; -inf for what the model cannot have (1).
+        (1); -inf for what the model cannot have.
     """
+    out = np.empty(len(log_odds))
     for q in range(len(log_odds)):
         taken, related, drifts = False, False, 0
-        for b in positions:
+        for b in members:
             related |= alike[b, 2] == alike[q, 2]
             drifts += alike[q, 3] >= 0 and alike[b, 3] == alike[q, 3]
             taken |= b == q or alike[b, 1] == alike[q, 1] or (alike[b, 0] == alike[q, 0] and not repeats[b])
-        counted[q] = -np.inf if taken or drifts >= most_drifts else log_odds[q] + (kin if related else 0.0)
-    return counted
+        out[q] = -np.inf if taken or drifts >= most_drifts else log_odds[q] + (kin if related else 0.0)
+    return out
 
 
 @compiled

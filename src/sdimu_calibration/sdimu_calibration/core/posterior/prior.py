@@ -119,9 +119,8 @@ class Prior:
         ndarray, shape (q,)
             Log (1); -inf for those that the model has already.
         """
-        at = np.asarray(base, dtype=np.int64)
-        next_one = self._next_one(self.named(base))
-        return odds_beside(next_one, self._alike, self.repeats, at, np.empty(len(next_one)), KIN, MOST_DRIFTS)
+        members, next_one = np.asarray(base, dtype=np.int64), self._next_one(self.named(base))
+        return odds_beside(next_one, self._alike, self.repeats, members, KIN, MOST_DRIFTS)
 
     def apart(self, base: Sequence[int], use: Ints) -> tuple[Ints, Ints]:
         """Say which pairs no model may hold: variants of one parameter, twins, more drifts of a bias than allowed.
