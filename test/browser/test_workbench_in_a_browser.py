@@ -261,7 +261,9 @@ def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command
     page.locator("#coefficients tr[data-coefficient=gyro_bias_x] button").click()
     page.wait_for_function("document.getElementById('mean').value.endsWith(' deg/h')")
     assert page.locator("#sigma").input_value().endswith(" deg/h")
-    page.locator("#mean").fill("0.2 deg/h")
+    # Near the estimate: how long a diagnosis of a model that is far off takes is no matter of this test.
+    fixed_at = float(page.locator("#mean").input_value().split()[0]) + 0.005
+    page.locator("#mean").fill(f"{fixed_at!r} deg/h")
     page.locator("#mean").blur()
     page.locator("#fix").click()
     page.locator("#coefficients tr", has_text="gyro_bias_x").filter(has_text="fixed").wait_for()
@@ -273,7 +275,7 @@ def test_points_in_a_box_and_a_fixed_coefficient_give_the_numbers_of_the_command
     exported = json.loads((home / "result.json").read_text(encoding="utf-8"))
     assert_same_numbers(calibrated(workbench, home, tmp_path / "again"), exported)
     fixed = next(c for c in exported["coefficients"] if c["name"] == "gyro_bias_x")
-    assert fixed["value"] == pytest.approx(math.radians(0.2) / 3600.0, rel=1e-9)
+    assert fixed["value"] == pytest.approx(math.radians(fixed_at) / 3600.0, rel=1e-9)
 
 
 def test_a_coefficient_is_edited_in_its_row_beside_the_heat_map(visit: Callable[[], Any]) -> None:
@@ -337,15 +339,16 @@ def test_every_axis_says_its_unit(visit: Callable[[], Any]) -> None:
 def test_ranking_heat_map_residuals_and_ladder_stand_in_one_view(visit: Callable[[], Any]) -> None:
     page = visit()
     page.set_viewport_size({"width": 1440, "height": 900})
-    page.wait_for_timeout(500)
+    # Figures are drawn anew after the window has its size: on a busy machine that takes its time.
     for name in ("heat", "residuals", "ladder", "ranking", "verdict", "add"):
-        box = page.locator(f"#{name}").bounding_box()
-        assert box["y"] >= 0, name
-        assert box["y"] + box["height"] <= 900, name
+        page.wait_for_function(
+            "name => { const box = document.getElementById(name).getBoundingClientRect();"
+            " return box.height > 0 && box.top >= 0 && box.bottom <= 900; }",
+            arg=name,
+        )
     for width in (800, 390):
         page.set_viewport_size({"width": width, "height": 1000})
-        page.wait_for_timeout(500)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
 
 
 def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Callable[[], Any]) -> None:
@@ -378,8 +381,11 @@ def test_before_and_after_are_shown_by_a_key_on_the_same_cells(visit: Callable[[
     page.keyboard.press("b")
     page.wait_for_function("document.querySelector('#shows input').checked")
     settle(page)
-    page.wait_for_timeout(500)
-    assert drawn(page, "heat", "z.map(r => Array.from(r))") == given
+    page.wait_for_function(
+        "given => JSON.stringify(Array.from(document.querySelector('#heat .js-plotly-plot')._fullData[0]"
+        ".z.map(r => Array.from(r)))) === JSON.stringify(given)",
+        arg=given,
+    )
     assert drawn(page, "heat", "x") == [str(stop) for stop in range(19)]
 
 

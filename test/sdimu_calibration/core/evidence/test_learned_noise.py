@@ -10,12 +10,12 @@ import pytest
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.learned_noise import (
+    InModes,
     NoiseInformation,
     Wander,
     given_terms,
     learn,
     likelihood,
-    sizes_on_grid,
 )
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
@@ -233,7 +233,8 @@ def test_what_noise_of_some_sensors_adds_is_that_of_the_whole_covariance(cut):
     """Beside other terms, against the dense likelihood."""
     terms, information = of_some_sensors(cut)
     one, *others = terms
-    size, gain = sizes_on_grid(*given_terms(information, cut, others, "accel"), cut, one)
+    given = given_terms(information, cut, others)["accel"]
+    size, gain = InModes.of(*given, cut, one.kind, one.tau).sizes_on_grid(one.axes)
     near = int(np.argmin(np.abs(np.log(size / one.size))))
     with_it = (replace(one, size=float(size[near])), *others)
 

@@ -12,7 +12,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.evidence.noise_root import folded, spread
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 
@@ -70,8 +70,7 @@ class Joint:
     def in_noise(self, terms: Sequence[NoiseTerm]) -> Information:
         """Information on the columns of the evidence in noise of these terms."""
         q, full = len(self.evidence.names), self.information
-        R = root_of(terms, self.wander.cut)
-        B = full.J[:q, q:] @ R
-        M = np.eye(R.shape[1]) + R.T @ full.J[q:, q:] @ R
-        X = np.linalg.solve(M, np.column_stack([B.T, R.T @ full.d[q:]]))
+        B = spread(full.J[:q, q:], terms, self.wander.cut)
+        M, y, _ = folded(full.J[q:, q:], full.d[q:], terms, self.wander.cut)
+        X = np.linalg.solve(M, np.column_stack([B.T, y]))
         return Information(full.J[:q, :q] - B @ X[:, :-1], full.d[:q] - B @ X[:, -1])

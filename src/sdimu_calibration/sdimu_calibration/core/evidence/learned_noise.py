@@ -16,7 +16,7 @@ inter-block information when block sizes are unequal", Biometrika 58 (1971).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,8 +26,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
-from sdimu_calibration.core.evidence.noise_root import own_columns, root_of, times, triad_root
+from sdimu_calibration.core.evidence.noise_root import folded, own_columns, root_of, times
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
+from sdimu_calibration.core.evidence.tridiagonal import Tridiagonal
 from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -236,7 +237,7 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
     terms = refined(information, cut, start)
     tried = kinds(cut)
     while True:
-        given = {triad: given_terms(information, cut, terms, triad) for triad in TRIADS}
+        given = given_terms(information, cut, terms)
         options = [
             size
             for triad in TRIADS
@@ -254,7 +255,7 @@ def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseT
     for place, term in enumerate(terms):
         if not term.tau:
             continue
-        given = given_terms(information, cut, [t for t in out if t is not term], term.triad)
+        given = given_terms(information, cut, [t for t in out if t is not term], [term.triad])[term.triad]
         tried = [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING]
         near = _best_sizes(*given, cut, tried)
         best = max(near, key=lambda t: t.gain)
@@ -267,7 +268,7 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     """Say of each term which kinds in its place are as likely, within odds of 20 to 1."""
     out = []
     for term in terms:
-        given = given_terms(information, cut, [t for t in terms if t is not term], term.triad)
+        given = given_terms(information, cut, [t for t in terms if t is not term], [term.triad])[term.triad]
         tried = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
         others = _best_sizes(*given, cut, tried)
         near = {t.kind for t in others if t.gain > term.gain - INDISTINGUISHABLE}
@@ -318,15 +319,16 @@ def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     """Log-likelihood of the known parameters and the noise terms, against no parameters and white noise."""
     if not terms:
         return information.fitted
-    R = root_of(terms, cut)
-    M = np.eye(R.shape[1]) + R.T @ information.J @ R
-    y = R.T @ information.d
-    return information.fitted + 0.5 * float(y @ np.linalg.solve(M, y)) - 0.5 * float(np.linalg.slogdet(M)[1])
+    M, y, _ = folded(information.J, information.d, terms, cut)
+    # The last row of the factor of M with y as one more row is L^-1 y; M is not below the unit matrix.
+    L = np.linalg.cholesky(np.block([[M, y[:, None]], [y, y @ y + 1.0]]))
+    z = L[-1, :-1]
+    return information.fitted + 0.5 * float(z @ z) - float(np.sum(np.log(np.diag(L)[:-1])))
 
 
 def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
     """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
-    return _best_size(*given_terms(information, cut, others, term.triad), cut, term)
+    return _best_size(*given_terms(information, cut, others, [term.triad])[term.triad], cut, term)
 
 
 def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:
@@ -336,19 +338,18 @@ def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]
 
 def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
     """Best size of a term, J (3 n, 3 n) and d (3 n,) the information on the wander of its triad."""
-    values, y2 = _modes(J, d, cut, term)
-    largest = float(values.max(initial=0.0))
-    if largest <= 0.0:
+    modes = InModes.of(J, d, cut, term.kind, term.tau).in_sensors(term.axes)
+    variance = _grid(modes)
+    if not len(variance):
         return replace(term, size=0.0, low=0.0, high=0.0, gain=0.0)
-    variance = _GRID / largest
-    gain = _gain(variance, values, y2)
+    gain = modes.gain(variance)
     at = int(np.argmax(gain))
     if gain[at] <= 0.0:
         inside = np.flatnonzero(gain > -_INTERVAL)
         high = float(np.sqrt(variance[inside[-1]])) if len(inside) else 0.0
         return replace(term, size=0.0, low=0.0, high=high, gain=0.0)
     fine = variance[at] * _FINE
-    near = _gain(fine, values, y2)
+    near = modes.gain(fine)
     best = int(np.argmax(near))
     # Noise that stands far out is known better than the coarse grid is wide: both grids say how far its interval goes.
     order = np.argsort(np.concatenate([variance, fine]))
@@ -359,57 +360,67 @@ def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTe
     return replace(term, size=float(np.sqrt(fine[best])), low=low, high=high, gain=float(near[best]))
 
 
-def sizes_on_grid(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Floats, Floats]:
-    """Log-likelihood of a term by its size.
+@dataclass(frozen=True)
+class InModes:
+    """Information on the modes of a kind of noise of unit size, r of them, in each sensor of a triad.
 
-    Parameters
+    Attributes
     ----------
-    J : ndarray, shape (3 n, 3 n)
-        Information on the wander of its triad, as of `given_terms`.
-    d : ndarray, shape (3 n,)
-    term : NoiseTerm
-        Its size is not read.
-
-    Returns
-    -------
-    size : ndarray, shape (s,)
-        SI, ascending; empty where the data say nothing of such noise.
-    gain : ndarray, shape (s,)
-        Log-likelihood over that without the term (1).
+    J : ndarray, shape (3 r, 3 r)
+        Mode by axis (1).
+    d : ndarray, shape (3 r,)
+        (1).
     """
-    values, y2 = _modes(J, d, cut, term)
-    largest = float(values.max(initial=0.0))
-    variance = _GRID / largest if largest > 0.0 else np.empty(0)
-    return np.sqrt(variance), _gain(variance, values, y2)
+
+    J: Floats
+    d: Floats
+
+    @classmethod
+    def of(cls, J: Floats, d: Floats, cut: Stretches, kind: str, tau: float) -> InModes:
+        """Take it from the information on the wander of a triad.
+
+        Parameters
+        ----------
+        J : ndarray, shape (3 n, 3 n)
+            As of `given_terms`, inverse squares of the units (SI) of the errors.
+        d : ndarray, shape (3 n,)
+            Inverse units.
+        """
+        root = cut.mode(kind, tau)
+        every = np.arange(3 * root.shape[1])
+        half = np.ascontiguousarray(times(J, root, every).T)
+        return cls(times(half, root, every), (root.T @ d.reshape(-1, 3)).ravel())
+
+    def in_sensors(self, axes: Sequence[int]) -> Tridiagonal:
+        """Information on the modes of some sensors alone."""
+        own = own_columns(axes, len(self.d) // 3)
+        return Tridiagonal.of(self.J[np.ix_(own, own)], self.d[own])
+
+    def sizes_on_grid(self, axes: Sequence[int]) -> tuple[Floats, Floats]:
+        """Log-likelihood of such noise in some sensors, by its size.
+
+        Returns
+        -------
+        size : ndarray, shape (s,)
+            SI, ascending; empty where the data say nothing of such noise.
+        gain : ndarray, shape (s,)
+            Log-likelihood over that without the term (1).
+        """
+        modes = self.in_sensors(axes)
+        variance = _grid(modes)
+        return np.sqrt(variance), modes.gain(variance)
 
 
-def _modes(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> tuple[Floats, Floats]:
-    """Information on the modes of a term of unit size (m,), and their squared projections (m,)."""
-    root = cut.mode(term.kind, term.tau)
-    own = own_columns(term, root.shape[1])
-    values, vectors = np.linalg.eigh(_projected(J, root)[np.ix_(own, own)])
-    y2 = (vectors.T @ (root.T @ d.reshape(cut.cells, 3)).ravel()[own]) ** 2
-    return np.maximum(values, 0.0), y2
-
-
-def _projected(J: Floats, root: Floats) -> Floats:
-    """Information on the modes of a triad, ``R'JR`` with the root (n, r) for each of the three sensors; (3 r, 3 r)."""
-    n, r = root.shape
-    once = (root.T @ J.reshape(n, 9 * n)).reshape(3 * r, n, 3)
-    out = np.ascontiguousarray(once.transpose(0, 2, 1)).reshape(9 * r, n) @ root
-    return np.ascontiguousarray(out.reshape(3 * r, 3, r).transpose(0, 2, 1)).reshape(3 * r, 3 * r)
-
-
-def _gain(variance: Floats, values: Floats, y2: Floats) -> Floats:
-    """Log-likelihood at each variance (v,), of modes with information `values` and squared projections `y2` (m,)."""
-    grown = 1.0 + variance[:, None] * values
-    return np.asarray(0.5 * np.sum(variance[:, None] * y2 / grown - np.log(grown), axis=1))
+def _grid(modes: Tridiagonal) -> Floats:
+    """Variances of noise that are tried first (v,); empty where the data say nothing of the modes."""
+    largest = modes.largest if len(modes.own) else 0.0
+    return _GRID / largest if largest > 0.0 else np.empty(0)
 
 
 def given_terms(
-    information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm], triad: str
-) -> tuple[Floats, Floats]:
-    """Information on further wander of a triad when that of some terms is in the model.
+    information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm], triads: Iterable[str] = TRIADS
+) -> dict[str, tuple[Floats, Floats]]:
+    """Information on further wander of triads when that of some terms is in the model.
 
     Parameters
     ----------
@@ -420,21 +431,18 @@ def given_terms(
 
     Returns
     -------
-    J : ndarray, shape (3 n, 3 n)
-        Inverse squares of the units (SI) of the errors.
-    d : ndarray, shape (3 n,)
-        Inverse units.
+    dict of str to (ndarray of shape (3 n, 3 n), ndarray of shape (3 n,))
+        Of each triad: information in inverse squares of the units (SI) of the errors, and its vector in inverse units.
     """
-    blocks = {(a, b): information.block(a, b) for a in TRIADS for b in TRIADS}
-    J, d = blocks[triad, triad], information.part(triad)
-    roots = {name: triad_root(terms, cut, name) for name in TRIADS}
-    taken = [name for name in TRIADS if roots[name][0].shape[1]]
-    if not taken:
-        return J, d
-    B = np.hstack([times(blocks[triad, name], *roots[name]) for name in taken])
-    M = np.block([[times(times(blocks[b, a], *roots[a]).T, *roots[b]).T for a in taken] for b in taken])
-    parts = {name: (roots[name][0].T @ information.part(name).reshape(cut.cells, 3)).ravel() for name in taken}
-    y = np.concatenate([parts[name][roots[name][1]] for name in taken])
-    M[np.diag_indices_from(M)] += 1.0
-    X = np.linalg.solve(M, np.column_stack([B.T, y]))
-    return J - B @ X[:, :-1], d - B @ X[:, -1]
+    out = {triad: (information.block(triad, triad), information.part(triad)) for triad in triads}
+    if not out or not any(t.size > 0.0 for t in terms):
+        return out
+    M, y, across = folded(information.J, information.d, terms, cut)
+    rows = across.reshape(cut.cells, 2, 3, len(y))
+    B = {triad: np.ascontiguousarray(rows[:, TRIADS.index(triad)]).reshape(-1, len(y)) for triad in out}
+    X = np.linalg.solve(M, np.column_stack([*(each.T for each in B.values()), y]))
+    parts = np.split(X[:, :-1], len(out), axis=1)
+    return {
+        triad: (J - B[triad] @ part, d - B[triad] @ X[:, -1])
+        for (triad, (J, d)), part in zip(out.items(), parts, strict=True)
+    }

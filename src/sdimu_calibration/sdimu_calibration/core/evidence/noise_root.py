@@ -67,13 +67,13 @@ def triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> tuple[
         return np.zeros((cut.cells, 0)), np.zeros(0, dtype=np.int64)
     own, begin = [], 0
     for term, root in zip(of_triad, roots, strict=True):
-        own.append(begin + own_columns(term, root.shape[1]))
+        own.append(begin + own_columns(term.axes, root.shape[1]))
         begin += 3 * root.shape[1]
     return np.hstack(roots), np.concatenate(own)
 
 
-def own_columns(term: NoiseTerm, modes: int) -> Ints:
-    """Columns of the sensors of a term, among those of three sensors.
+def own_columns(axes: Sequence[int], modes: int) -> Ints:
+    """Columns of some sensors, among those of three.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def own_columns(term: NoiseTerm, modes: int) -> Ints:
     ndarray of int, shape (k,)
         Among 3 r, mode by axis.
     """
-    return np.asarray((3 * np.arange(modes)[:, None] + np.array(term.axes)).ravel())
+    return np.asarray((3 * np.arange(modes)[:, None] + np.array(axes)).ravel())
 
 
 def times(J: Floats, root: Floats, own: Ints) -> Floats:
@@ -108,3 +108,49 @@ def times(J: Floats, root: Floats, own: Ints) -> Floats:
     n, r = root.shape
     every = np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1).reshape(-1, 3 * r)
     return np.ascontiguousarray(every if len(own) == 3 * r else every[:, own])
+
+
+def spread(J: Floats, terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
+    """Spread the columns of a matrix over independent modes of unit variance, ``JR`` with the root of `root_of`.
+
+    Parameters
+    ----------
+    J : ndarray, shape (m, 6 n)
+        Inverse units (SI) of the mean errors of n cells.
+
+    Returns
+    -------
+    ndarray, shape (m, r)
+        (1).
+    """
+    parts = J.reshape(len(J), cut.cells, 2, 3)
+    out = [np.zeros((len(J), 0))]
+    for k, triad in enumerate(TRIADS):
+        root, own = triad_root(terms, cut, triad)
+        if len(own):
+            out.append(times(np.ascontiguousarray(parts[:, :, k]).reshape(len(J), -1), root, own))
+    return np.hstack(out)
+
+
+def folded(J: Floats, d: Floats, terms: Sequence[NoiseTerm], cut: Stretches) -> tuple[Floats, Floats, Floats]:
+    """Information on independent modes of unit variance, with what is known of them before the data.
+
+    Parameters
+    ----------
+    J : ndarray, shape (6 n, 6 n)
+        Information on the mean errors of n cells, inverse squares of their units (SI).
+    d : ndarray, shape (6 n,)
+
+    Returns
+    -------
+    M : ndarray, shape (r, r)
+        ``I + R'JR`` with the root R of `root_of` (1).
+    y : ndarray, shape (r,)
+        ``R'd`` (1).
+    across : ndarray, shape (6 n, r)
+        ``JR``, inverse units (SI) of the errors.
+    """
+    across = spread(J, terms, cut)
+    M = spread(np.ascontiguousarray(across.T), terms, cut)
+    M[np.diag_indices_from(M)] += 1.0
+    return M, spread(d[None], terms, cut)[0], across

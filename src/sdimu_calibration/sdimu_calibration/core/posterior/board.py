@@ -15,9 +15,9 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import of_the_sensor
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander, likelihood
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, likelihood
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.evidence.noise_root import folded, root_of, spread
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains
@@ -119,6 +119,13 @@ class Board(Generic[E]):
         return max(left / max(len(evidence.e) - len(members), 1), 1.0)
 
     @cached_property
+    def _nothing(self) -> NoiseInformation:
+        """Information on the wander beside no effect."""
+        if self.joint is None:
+            raise AssertionError("a board without wander has no noise with a memory")
+        return self.joint.on_wander(self.evidence.model, self.evidence.weight)
+
+    @cached_property
     def use(self) -> Ints:
         """Columns of the evidence that the coefficients do not take up, in the order of the candidates of `data`.
 
@@ -186,12 +193,12 @@ class Board(Generic[E]):
         if not noise.terms or self.joint is None or self.wander is None:
             return InNoise(J, d, np.zeros((0, 0)), np.zeros((0, len(keep))), np.zeros(0), np.zeros((0, 0)))
         joint, n = self.joint.information, len(self.evidence.names)
-        R = root_of(noise.terms, self.wander.cut)
-        B, y = R.T @ joint.J[n:, keep], R.T @ joint.d[n:]
-        M = np.eye(R.shape[1]) + R.T @ (joint.J[n:, n:] @ R)
+        cut = self.wander.cut
+        B = spread(joint.J[keep, n:], noise.terms, cut).T
+        M, y, _ = folded(joint.J[n:, n:], joint.d[n:], noise.terms, cut)
         inverse: Floats = np.asarray(np.linalg.inv(M))
         X = inverse @ B
-        return InNoise(J - B.T @ X, d - X.T @ y, R, X, inverse @ y, inverse)
+        return InNoise(J - B.T @ X, d - X.T @ y, root_of(noise.terms, cut), X, inverse @ y, inverse)
 
     def data(self, noise: NoiseModel) -> tuple[float, Data]:
         """Log posterior of no effect in a noise, over that in white noise; and the candidates in it."""
@@ -199,8 +206,7 @@ class Board(Generic[E]):
             evidence, p, one = self.evidence, len(self.evidence.weight), self.in_noise(noise)
             offset = noise.log_prior
             if noise.terms and self.joint is not None and self.wander is not None:
-                nothing = self.joint.on_wander(evidence.model, evidence.weight)
-                offset += (likelihood(nothing, self.wander.cut, noise.terms) - nothing.fitted) / self.excess
+                offset += (likelihood(self._nothing, self.wander.cut, noise.terms) - self._nothing.fitted) / self.excess
             given = Information(one.J, one.d).given(np.arange(p), evidence.weight)
             scaled = np.ascontiguousarray(given.J[p:, p:] * np.outer(self.size, self.size))
             self._data[noise] = offset, Data(scaled, given.d[p:] * self.size, self.prior)

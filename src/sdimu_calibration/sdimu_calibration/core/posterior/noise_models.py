@@ -14,13 +14,7 @@ from itertools import chain, combinations, product, repeat
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.evidence.learned_noise import (
-    NoiseInformation,
-    given_terms,
-    kinds,
-    likelihood,
-    sizes_on_grid,
-)
+from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, given_terms, kinds, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import (
     AXES,
@@ -199,12 +193,31 @@ class _Search:
             own = _of_triad(NoiseModel(terms), term.triad)
             if len(own) < _MOST_TERMS and not _is_in(term, own) and not (terms and not own and self._hopeless(term)):
                 room.append(term)
-        given = {name: given_terms(self.information, self.cut, terms, name) for name in {t.triad for t in room}}
-        sized = side_by_side(lambda term: self.sized(*given[term.triad], term), room)
+        given = given_terms(
+            self.information, self.cut, terms, [name for name in TRIADS if any(t.triad == name for t in room)]
+        )
+        alike: dict[tuple[str, str, float], list[NoiseTerm]] = {}
+        for term in room:
+            alike.setdefault(term.identity[:3], []).append(term)
+        sized = side_by_side(lambda own: self._in_sensors(*given[own[0].triad], own), alike.values())
         return [
             self.keep(_Found(NoiseModel((*terms, term), base.noise.log_prior + share), base.gain + term.gain))
-            for term, share in filter(None, sized)
+            for term, share in chain.from_iterable(sized)
         ]
+
+    def _in_sensors(self, J: Floats, d: Floats, terms: Sequence[NoiseTerm]) -> list[tuple[NoiseTerm, float]]:
+        """Best sizes of one kind of noise in each choice of sensors; a sensor that alone has none is in no choice."""
+        modes = InModes.of(J, d, self.cut, terms[0].kind, terms[0].tau)
+        out, without = [], set[int]()
+        for term in sorted(terms, key=lambda t: len(t.axes)):
+            if without & set(term.axes):
+                continue
+            found = self.sized(modes, term)
+            if found is not None:
+                out.append(found)
+            elif len(term.axes) == 1:
+                without.update(term.axes)
+        return out
 
     def _hopeless(self, term: NoiseTerm) -> bool:
         """Whether a term was far behind the best one of its triad alone: the other triad changes little of that."""
@@ -214,9 +227,9 @@ class _Search:
         own = max((score for known, score in of_triad if known[:3] == term.identity[:3]), default=-np.inf)
         return own < max((score for _, score in of_triad), default=-np.inf) - _HOPELESS
 
-    def sized(self, J: Floats, d: Floats, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
+    def sized(self, modes: InModes, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
         """Best size of a term, and the log of its odds with the share of the sizes that the likelihood leaves."""
-        size, gain = sizes_on_grid(J, d, self.cut, term)
+        size, gain = modes.sizes_on_grid(term.axes)
         if not len(size):
             return None
         log_posterior = gain + self.usual.log_density(term, size)
@@ -251,7 +264,8 @@ class _Search:
         for place in list(sized):
             others = [found[0] for k, found in sized.items() if k != place]
             term = sized[place][0]
-            again = self.sized(*given_terms(self.information, self.cut, others, term.triad), term)
+            given = given_terms(self.information, self.cut, others, [term.triad])[term.triad]
+            again = self.sized(InModes.of(*given, self.cut, term.kind, term.tau), term)
             if again is None:
                 del sized[place]
             else:

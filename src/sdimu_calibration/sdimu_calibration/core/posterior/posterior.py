@@ -253,7 +253,7 @@ def posterior(
     # About another point two of a start may be one, or a size have the other sign: that is no model any more.
     starts = [one for one in dict.fromkeys(named) if np.isfinite(board.data(NoiseModel())[1].at(one).score)]
     # Functions of the attitude stand in the place of many effects: no search from these leads there.
-    wide = before is None or (wander is not None and wander.cut.functions is not None)
+    wide = before is None or (_has_functions(wander) and not _has_functions(before.board.wander))
     tried = before.tried if before is not None and not wide else None
     settled = not wide and len(starts) > 0
     noises, members, beside = _climbed(board, starts or [()], tried, settled)
@@ -275,6 +275,10 @@ def posterior(
     models = _weighed(found, noises)
     beside = [((score - noise.log_prior) / board.excess + noise.log_prior, noise) for score, noise in beside]
     return Posterior(board, models, _noises(models, beside))
+
+
+def _has_functions(wander: Wander | None) -> bool:
+    return wander is not None and wander.cut.functions is not None
 
 
 def _noises(
