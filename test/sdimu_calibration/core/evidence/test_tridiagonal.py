@@ -39,3 +39,9 @@ def test_noise_that_nothing_pulls_at_only_costs():
     gain = Tridiagonal.of(J, np.zeros(9)).gain(np.array([0.0, 1.0, 10.0]))
     assert gain[0] == 0.0
     assert gain[2] < gain[1] < 0.0
+
+
+def test_no_modes_are_no_noise():
+    """As of a kind that no stretch shows: drawn in turns, where none is."""
+    chain = Tridiagonal.of(np.zeros((0, 0)), np.zeros(0))
+    assert len(chain.own) == len(chain.gain(np.empty(0))) == 0

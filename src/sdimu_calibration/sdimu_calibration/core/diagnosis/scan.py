@@ -13,12 +13,15 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE, TESTABLE
+from sdimu_calibration.core.side_by_side import side_by_side
 
 POWER_80 = 4.84
 """Size of an effect (sigma) that is found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
 _DRAWS = 4000
 """Number of draws of noise: at a false-alarm probability of 0.02, 80 of them are beyond the threshold, which is then
 right to a tenth of that probability."""
+_ROWS = 150
+"""Number of candidates whose scores are drawn at a time: of a triangle of 1500 rows little is drawn twice."""
 _JITTER = 1e-6
 """Variance added to that of every score (1): identical signatures have a singular correlation."""
 
@@ -97,8 +100,14 @@ def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alph
     C = correlation(given.J[len(known) :, len(known) :])
     root = np.linalg.cholesky(C + _JITTER * np.eye(len(C)))
     rng = np.random.default_rng(seed)
-    largest = np.abs(root @ rng.standard_normal((len(C), _DRAWS))).max(axis=0)
-    return float(np.quantile(largest, 1.0 - alpha))
+    draws = rng.standard_normal((len(C), _DRAWS))
+
+    def largest(begin: int) -> Floats:
+        # The root is triangular: no row needs draws behind it.
+        end = min(begin + _ROWS, len(C))
+        return np.asarray(np.abs(root[begin:end, :end] @ draws[:end]).max(axis=0))
+
+    return float(np.quantile(np.max(side_by_side(largest, range(0, len(C), _ROWS)), axis=0), 1.0 - alpha))
 
 
 def correlation(J: Floats) -> Floats:

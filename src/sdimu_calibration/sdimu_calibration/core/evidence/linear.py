@@ -23,8 +23,11 @@ from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
+from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.specification import ImuSpecification
 
+_BLOCK = 150
+"""Number of columns that are multiplied at a time: their products with those behind them are the same, turned."""
 E = TypeVar("E", bound="LinearEvidence")
 
 
@@ -202,12 +205,20 @@ class LinearEvidence(ABC):
         more, prior = candidate_priors(effects, self.imu)
         W = self.signature(effects)
         # Only what is new is multiplied: the old columns are many.
-        weighed = self.weighed(W)
-        old, across = self.information, self.W.T @ weighed
-        J = np.block([[old.J, across], [across.T, W.T @ weighed]])
+        weighed, every, old = self.weighed(W), np.hstack([self.W, W]), self.information
+        q = len(old.d)
+        J = np.empty((every.shape[1], every.shape[1]))
+        J[:q, :q] = old.J
+
+        def fill(begin: int) -> None:
+            end = min(begin + _BLOCK, W.shape[1])
+            J[: q + end, q + begin : q + end] = every[:, : q + end].T @ weighed[:, begin:end]
+            J[q + begin : q + end, : q + end] = J[: q + end, q + begin : q + end].T
+
+        side_by_side(fill, range(0, W.shape[1], _BLOCK))
         return replace(
             self,
-            W=np.hstack([self.W, W]),
+            W=every,
             names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
             prior=np.concatenate([self.prior, prior]),

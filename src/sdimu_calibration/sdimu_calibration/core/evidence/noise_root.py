@@ -106,7 +106,7 @@ def times(J: Floats, root: Floats, own: Ints) -> Floats:
         In the unit of J times SI.
     """
     n, r = root.shape
-    every = np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1).reshape(-1, 3 * r)
+    every = np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1).reshape(len(J), 3 * r)
     return np.ascontiguousarray(every if len(own) == 3 * r else every[:, own])
 
 
