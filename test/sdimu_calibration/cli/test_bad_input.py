@@ -30,6 +30,8 @@ UNUSABLE = (
     ("effects folder.yaml", "folder.yaml: is a folder"),
     ("calibrate BAG --reference-temperature '-300 degC'", "--reference-temperature"),
     ("calibrate BAG --whole-turns nan", "--whole-turns"),
+    ("calibrate BAG --out found", "found holds a diagnosis"),
+    ("calibrate BAG BAG --out found", "found holds a diagnosis"),
     ("plan --rates 1e300", "--rates '1e300'"),
     ("plan --dwells 1e300", "--dwells '1e300'"),
     ("plan --acceleration nan", "--acceleration nan"),
@@ -63,6 +65,8 @@ WRONG_USAGE = (
 def ended(monkeypatch, capsys, tmp_path, bag):
     """Run a line of `sdimu` in a folder of its own; return exit status and stderr."""
     (tmp_path / "folder.yaml").mkdir()
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found" / "diagnosis.json").touch()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
 

@@ -12,7 +12,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.next_commands import Asked, spelled
-from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
+from sdimu_calibration.cli.opened import default_folder, explained, folder_for_result, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
@@ -57,6 +57,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
         refuse_for_sets(opening, truth=truth)
         calibrate_together(SetRequest(bags or [], opening, request))
         return
+    folder = folder_for_result(request.out or default_folder(bag))
     test, wanted, chosen = opened(console, bag, opening, request)
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
@@ -66,7 +67,6 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     # Without a place gravity is a convention, and the truth is compared at it.
     taken = STANDARD_GRAVITY if test.site is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
-    folder = request.out or default_folder(bag)
     about = Asked.of((bag,), folder, opening, request)
     with written_together(folder) as part:
         write_result(part / "result.json", result)

@@ -116,6 +116,16 @@ def printing(console: Console, asked: bool) -> Callable[[Path], None]:
     return lambda page: say(console, f"printed: {print_pdf(page, program)}")
 
 
+def folder_for_result(folder: Path) -> Path:
+    """Return the folder of a calibration; one that holds a diagnosis is refused, as half of it would be replaced."""
+    if (folder / "diagnosis.json").exists() or (folder / "set.json").exists():
+        raise DataError(
+            f"{folder} holds a diagnosis, whose result.json and report.html would be replaced: choose another --out, "
+            "or remove that folder"
+        )
+    return folder
+
+
 def default_folder(bag: Path, what: str = "calibration") -> Path:
     """Folder of the results of a bag: beside it, its stem with ``_calibration``."""
     bag = bag.resolve()

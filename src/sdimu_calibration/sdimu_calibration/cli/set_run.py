@@ -14,7 +14,7 @@ import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
-from sdimu_calibration.cli.opened import leave, printing, tell
+from sdimu_calibration.cli.opened import folder_for_result, leave, printing, tell
 from sdimu_calibration.cli.options import FitRequest, Place, StatedOpening
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.core.note import without_advice
@@ -94,11 +94,10 @@ def calibrate_together(asked: SetRequest) -> None:
     from sdimu_calibration.storage.set_work import judged_outcome
 
     console = plain(stderr=asked.request.as_json)
-    printed = printing(console, asked.request.pdf)
+    printed, folder = printing(console, asked.request.pdf), folder_for_result(_folder(asked, "calibration"))
     with _begun(console, asked) as (members, options, run, progress):
         result = _with_serial(judged_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
-    folder = _folder(asked, "calibration")
     with written_together(folder) as part:
         write_result(part / "result.json", result)
         write_report(part / "report.html", result, title=page_title(asked, "Calibration", result), trace=_trace(asked))
