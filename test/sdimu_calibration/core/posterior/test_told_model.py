@@ -73,6 +73,26 @@ def test_an_effect_beside_another_of_its_family_does_not_stand_in_its_place():
     assert found._in_place_of((SHORT,)) == []
 
 
+def test_two_that_stand_in_each_others_place_are_not_told_together():
+    """Each is probable, and a model that holds both is not."""
+    found = window(((QUADRATIC, SHORT), 0.48), ((OTHER, SHORT), 0.47), ((QUADRATIC, OTHER, SHORT), 0.05))
+    assert told(found) == {KEYS[QUADRATIC], KEYS[SHORT]}
+
+
+def test_what_is_probable_apart_from_each_other_is_told_together():
+    both = ((QUADRATIC, SHORT), 0.3), ((QUADRATIC, LONG), 0.3)
+    found = window(((QUADRATIC,), 0.35), *both, ((SHORT,), 0.05))
+    assert told(found) == {KEYS[QUADRATIC], KEYS[SHORT]}
+
+
+def test_a_family_is_as_sure_as_that_so_many_of_it_are_there():
+    """One of three misalignments is certain, which makes the second no surer."""
+    found = window(((QUADRATIC, OTHER), 0.6), ((QUADRATIC, RAMP), 0.4))
+    assert [found.of_family(place) for place in range(2)] == pytest.approx([1.0, 0.6])
+    drifts = window(((SHORT, RAMP), 0.7), ((SHORT,), 0.3))
+    assert [drifts.of_family(place) for place in range(2)] == pytest.approx([0.7, 0.7])
+
+
 def test_the_next_search_begins_with_the_likeliest_model_in_each_noise():
     # Noise with a memory makes the effect unnecessary: about the next point that must be asked again.
     walk = NoiseModel((NoiseTerm("gyro", "random_walk", size=1e-6),), -1.0)

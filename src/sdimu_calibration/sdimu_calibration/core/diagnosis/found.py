@@ -15,7 +15,6 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
 
@@ -54,7 +53,8 @@ class Found:
         Labels of two effects that together show as this one does, to rounding, and the probability that both are
         there.
     of_family : float
-        Probability that its family is missing on its sensor; NaN where no probabilities were worked out.
+        Probability that its family is missing on its sensor, as often as it is told there; NaN where no probabilities
+        were worked out.
     """
 
     candidate: Candidate
@@ -119,7 +119,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 coefficient_shifts=coefficient_shifts(problem, chosen, column, others),
                 probability=probability,
                 may_be=shares,
-                of_family=_of_family(d, d.chosen[k]),
+                of_family=_of_family(d, column),
                 together=_together(d, column),
             )
         )
@@ -143,12 +143,12 @@ def _together(d: Diagnosis, column: int) -> tuple[tuple[str, str, float], ...]:
     return tuple((window.candidate(one).label, window.candidate(other).label, p) for one, other, p in pairs)
 
 
-def _of_family(d: Diagnosis, candidate: Candidate) -> float:
-    """Probability that a candidate's family is missing on its sensor; NaN where no probabilities were worked out."""
-    if d.probabilities is None:
+def _of_family(d: Diagnosis, column: int) -> float:
+    """Probability of the family of a chosen column; NaN where no probabilities were worked out."""
+    window = d.found.posterior
+    if d.probabilities is None or window is None:
         return float("nan")
-    own = family_of(candidate)
-    return next((f.probability for f in d.probabilities.families if (f.family, f.sensor) == own), 0.0)
+    return window.of_family(window.place_of(column))
 
 
 def _held_out(d: Diagnosis, count: int) -> list[float]:

@@ -10,7 +10,6 @@ from typing import Generic
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
@@ -23,6 +22,7 @@ from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW, climb, window
+from sdimu_calibration.core.posterior.sharpening import hoped, sharpened
 
 PROBABLE = 0.5
 """Probability from which a class of effects is told as found: more likely there than not."""
@@ -39,11 +39,6 @@ _TIE = 0.5
 same would go to and fro."""
 _HOPEFUL = 15.0
 """Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
-_HOPED = 8.0
-"""Log posterior (1) that a candidate may be short of a place in the model for its time constant to be sharpened:
-between two of a scan it may gain as much."""
-_MOST_HOPED = 3
-"""Number of candidates outside the model that are sharpened at most: each takes signatures of its own."""
 _MOST_SHARPENED = 20
 """Number of times or time constants that are put between those of the scan at most: each takes a climb."""
 _FEW = 2
@@ -85,18 +80,27 @@ class Posterior(Generic[E]):
 
     @cached_property
     def told(self) -> Weighed:
-        """The model that is told: the likeliest one that has of each class the likeliest family, and what is probable.
+        """The model that is told: of what is probable, the likeliest that is so together.
 
         A family of many variants (a warm-up, of any time constant) shares its probability out; another one with a
-        single variant, or no effect at all, is then ahead of each, and behind all of them together.
+        single variant, or no effect at all, is then ahead of each, and behind all of them together. So models count
+        together that have something of the same: of each class of the best model, and of what is probable besides.
+        Of those the one is told that has most of the likeliest family of each class.
         """
-        wanted = [self._likeliest(alike) for alike in self._classes_of(self.best)]
-        for numbers in self._families.values():
-            if self._any_of(numbers) > PROBABLE and not any(numbers & have for have in wanted):
-                wanted.append(numbers)
-        held = [{number for number, _ in model.members} for model in self.models]
-        most = [sum(bool(numbers & have) for numbers in wanted) for have in held]
-        return self.models[int(np.argmax(most))]
+        classes = [frozenset(alike) for alike in self._classes_of(self.best)]
+        probable = [numbers for numbers in self._families.values() if self._any_of(numbers) > PROBABLE]
+        # What stands in the place of another one is not told beside it.
+        besides = [numbers for numbers in probable if not any(numbers & alike for alike in classes)]
+        if not classes and not besides:
+            return self.best
+        _, kind = np.unique(self._hold([*classes, *besides]), axis=0, return_inverse=True)
+        likeliest = int(np.argmax(np.bincount(kind.ravel(), self._weights)))
+        most = self._hold([*map(self._likeliest, classes), *besides]).sum(axis=1)
+        return self.models[int(np.argmax(np.where(kind.ravel() == likeliest, most, -1)))]
+
+    def _hold(self, every: Sequence[Iterable[int]]) -> Bools:
+        """Whether each model holds one of some candidates; shape (models, len(every))."""
+        return np.column_stack([self._holds[:, list(numbers)].any(axis=1) for numbers in every])
 
     @cached_property
     def _families(self) -> dict[tuple[str, str], frozenset[int]]:
@@ -210,6 +214,12 @@ class Posterior(Generic[E]):
         """Probability that a member of the told model, or something of its class, is present."""
         return self._any_of((self.told.members[place][0], *self.classes[place]))
 
+    def of_family(self, place: int) -> float:
+        """Probability of as many of the family of a member of the told model as are told: one beside another is two."""
+        family = self._families[family_of(self.candidate(self.told.members[place][0]))]
+        told = sum(number in family for number, _ in self.told.members)
+        return min(1.0, float(self._weights @ (self._holds[:, list(family)].sum(axis=1) >= told)))
+
     def place_of(self, column: int) -> int:
         """Place in the told model of a column of the evidence."""
         return self.board.columns(self.told.members).index(column)
@@ -258,15 +268,15 @@ def posterior(
     settled = not wide and len(starts) > 0
     noises, members, beside = _climbed(board, starts or [()], tried, settled)
     asked: set[str] = set()
-    sharpened = 0
-    while sharpened < _MOST_SHARPENED:
-        sharper = _sharpened(board, members, noises[0]) or _hoped(board, members, noises[0], asked)
+    made = 0
+    while made < _MOST_SHARPENED:
+        sharper = sharpened(board, members, noises[0]) or hoped(board, members, noises[0], asked)
         if sharper is None:
             break
         board, starts = sharper
         noises, members = _in_same_noise(board, starts, noises)
-        sharpened += 1
-    if sharpened:
+        made += 1
+    if made:
         noises, members, beside = _climbed(board, [members], tried, settled=True)
     board = board.in_excess(board.excess_of(members, noises[0]))
     data = [board.data(noise) for noise in noises]
@@ -399,78 +409,3 @@ def _without_drifts(board: Board[E], members: Members) -> Members:
     effects = [board.evidence.candidates[column - first].effect for column in board.columns(members)]
     drifts = [e.bias_drift or e.wander_like or e.scope == "recording" for e in effects]
     return tuple(m for m, drift in zip(members, drifts, strict=True) if not drift)
-
-
-def _sharpened(board: Board[E], members: Members, noise: NoiseModel) -> tuple[Board[E], list[Members]] | None:
-    """Put a time or time constant between those of the scan into a model; None where none is worth it.
-
-    Returns
-    -------
-    board : Board
-        With the finer variant.
-    starts : list of tuple of (int, int)
-        The model with it in the place of the one that it is a variant of; and without others on the same sensor that
-        have variants, too: beside a wrong time constant they stand for the difference.
-    """
-    columns = board.columns(members)
-    first = len(board.evidence.weight)
-    effects = [board.evidence.candidates[column - first].effect for column in columns]
-    worth = -board.data(noise)[1].at(members).drops()
-    for place in [int(k) for k in np.argsort(-worth)]:
-        if columns[place] in board.finer or effects[place].nearer is None:
-            continue
-        sensors = {term.channel for term in effects[place].terms}
-        apart = [
-            k
-            for k, effect in enumerate(effects)
-            if k == place or effect.nearer is None or not sensors & {term.channel for term in effect.terms}
-        ]
-        beside = tuple(members[k] for k in apart)
-        effect = board.finer_variant(beside, apart.index(place), noise)
-        if effect is None or effect.labels[0] in board.evidence.names:
-            continue
-        finer, added = _with_finer(board, effect)
-        places = {int(k): i for i, k in enumerate(finer.use.tolist())}
-        if added not in places:
-            continue
-        columns[place] = added
-        both = [range(len(members)), apart] if len(apart) < len(members) else [range(len(members))]
-        return finer, [tuple(sorted((places[columns[k]], members[k][1]) for k in kept)) for kept in both]
-    return None
-
-
-def _hoped(
-    board: Board[E], members: Members, noise: NoiseModel, asked: set[str]
-) -> tuple[Board[E], list[Members]] | None:
-    """Put a time or time constant between those of the scan beside a model that its neighbours nearly enter.
-
-    `asked` are the labels of those that were looked at; board and starts as of `_sharpened`, None where none is worth
-    it.
-    """
-    gains = board.data(noise)[1].at(members).gains()
-    first = len(board.evidence.weight)
-    for number in np.argsort(-gains.max(axis=1)).tolist():
-        if not gains[number].max() > -_HOPED or len(asked) >= _MOST_HOPED:
-            break
-        column = int(board.use[number])
-        candidate = board.evidence.candidates[column - first]
-        if candidate.effect.nearer is None or column in board.finer or candidate.label in asked:
-            continue
-        asked.add(candidate.label)
-        own = (number, int(np.argmax(gains[number])))
-        effect = board.finer_variant((*members, own), len(members), noise)
-        if effect is None or effect.labels[0] in board.evidence.names:
-            continue
-        finer, added = _with_finer(board, effect)
-        places = {int(k): i for i, k in enumerate(finer.use.tolist())}
-        if added in places:
-            kept = [(places[c], m[1]) for c, m in zip(board.columns(members), members, strict=True)]
-            return finer, [tuple(sorted((*kept, (places[added], own[1])))), tuple(sorted(kept))]
-    return None
-
-
-def _with_finer(board: Board[E], effect: Effect) -> tuple[Board[E], int]:
-    """Add a variant between those of the scan: the board with it, and its column."""
-    evidence = board.evidence.with_effects([effect])
-    added = len(evidence.names) - 1
-    return Board(evidence, np.append(board.allowed, added), board.finer | {added}, board.wander, board.joint), added
