@@ -41,6 +41,13 @@ def test_noise_that_nothing_pulls_at_only_costs():
     assert gain[2] < gain[1] < 0.0
 
 
+def test_information_that_is_negative_by_rounding_is_none():
+    """What coefficients take up leaves differences of large numbers."""
+    J, d = information(30, 5, 11)
+    gain = Tridiagonal.of(J - 1e-7 * np.eye(30), d).gain(np.logspace(0.0, 9.0, 10))
+    assert np.isfinite(gain).all()
+
+
 def test_no_modes_are_no_noise():
     """As of a kind that no stretch shows: drawn in turns, where none is."""
     chain = Tridiagonal.of(np.zeros((0, 0)), np.zeros(0))

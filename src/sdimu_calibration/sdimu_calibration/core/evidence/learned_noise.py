@@ -320,8 +320,8 @@ def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     if not terms:
         return information.fitted
     M, y, _ = folded(information.J, information.d, terms, cut)
-    # The last row of the factor of M with y as one more row is L^-1 y; M is not below the unit matrix.
-    L = np.linalg.cholesky(np.block([[M, y[:, None]], [y, y @ y + 1.0]]))
+    # The last row of the factor of M with y as one more row is L^-1 y, which is no longer than y.
+    L = np.linalg.cholesky(np.block([[M, y[:, None]], [y, 2.0 * y @ y + 1.0]]))
     z = L[-1, :-1]
     return information.fitted + 0.5 * float(z @ z) - float(np.sum(np.log(np.diag(L)[:-1])))
 

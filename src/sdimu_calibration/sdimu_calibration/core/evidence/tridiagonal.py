@@ -139,10 +139,11 @@ def chained(variance: Floats, own: Floats, beside: Floats, pull2: float) -> Floa
     last = len(own) - 1
     for k in range(len(variance)):
         v = variance[k]
-        c = 1.0 + v * own[last]
+        # Less than 1 is rounding: I + vA is not below the unit matrix, and so are its pivots.
+        c = max(1.0 + v * own[last], 1.0)
         log_det = np.log(c)
         for i in range(last - 1, -1, -1):
-            c = 1.0 + v * own[i] - (v * beside[i]) ** 2 / c
+            c = max(1.0 + v * own[i] - (v * beside[i]) ** 2 / c, 1.0)
             log_det += np.log(c)
         out[k] = 0.5 * (v * pull2 / c - log_det)
     return out
