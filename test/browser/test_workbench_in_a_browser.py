@@ -339,16 +339,20 @@ def test_every_axis_says_its_unit(visit: Callable[[], Any]) -> None:
 def test_ranking_heat_map_residuals_and_ladder_stand_in_one_view(visit: Callable[[], Any]) -> None:
     page = visit()
     page.set_viewport_size({"width": 1440, "height": 900})
-    # Figures are drawn anew after the window has its size: on a busy machine that takes its time.
-    for name in ("heat", "residuals", "ladder", "ranking", "verdict", "add"):
-        page.wait_for_function(
-            "name => { const box = document.getElementById(name).getBoundingClientRect();"
-            " return box.height > 0 && box.top >= 0 && box.bottom <= 900; }",
-            arg=name,
-        )
+    inside = (
+        "(height) => ['heat', 'residuals', 'ladder', 'ranking', 'verdict', 'add'].every(name => {"
+        " const box = document.getElementById(name).getBoundingClientRect();"
+        " return box.height > 0 && box.top >= 0 && box.bottom <= height; })"
+    )
+    # Figures are drawn anew after the window has its size: what is asked must hold when nothing moves any more.
+    page.wait_for_function(inside, arg=900)
+    settle(page)
+    assert page.evaluate(inside, 900)
     for width in (800, 390):
         page.set_viewport_size({"width": width, "height": 1000})
         page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
+        settle(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Callable[[], Any]) -> None:
