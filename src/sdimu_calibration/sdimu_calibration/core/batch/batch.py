@@ -232,8 +232,9 @@ def _links(
         log_weight -= 3.0 * float(np.log(setup.model.velocity_sigma) + np.log(setup.model.position_sigma))
         if k == 0:
             parts.append(initial(start, point.C_nb[0], p))
-            parts.append((np.zeros((p, PER_STOP)), np.eye(p), point.coefficients / prior))
-            log_weight -= float(np.sum(np.log(start.filter_sigma)))
+            white = np.linalg.inv(np.linalg.cholesky(setup.sensors.correlation))
+            parts.append((np.zeros((p, PER_STOP)), white, white @ (point.coefficients / prior)))
+            log_weight += float(np.sum(np.log(np.diag(white)))) - float(np.sum(np.log(start.filter_sigma)))
         step = nothing(p)
         if k < len(travels):
             resting = dt[where.stop_last[k]] - dt[where.stop_first[k]]

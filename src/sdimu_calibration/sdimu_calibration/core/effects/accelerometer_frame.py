@@ -93,8 +93,20 @@ class AccelerometerFrameModel:
 
 def squares_count(sensors: ImuModel) -> bool:
     """Tell whether the specification lets errors be so large that their squares count."""
-    linear = [i for i, p in enumerate(sensors.parameters) if p.unit in ("1", "rad") and _SCALE_OR_ANGLE.search(p.name)]
-    return bool(linear) and float(np.max(sensors.prior[linear])) > LARGE
+    linear = scales_and_angles(sensors)
+    return bool(len(linear)) and float(np.max(sensors.prior[linear])) > LARGE
+
+
+def scales_and_angles(sensors: ImuModel) -> Ints:
+    """List the places of scale factors and misalignments.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Ascending.
+    """
+    found = [i for i, p in enumerate(sensors.parameters) if p.unit in ("1", "rad") and _SCALE_OR_ANGLE.search(p.name)]
+    return np.array(found, dtype=np.int64)
 
 
 def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration: float) -> bool:
@@ -144,7 +156,8 @@ def accelerometer_frame_model(
         effects.append(registry.get("gyro_g_sensitivity").only(_OUTSIDE))
     inner = imu_model.build([*effects, *more], imu)
     sizes = dict(zip(inner.names, inner.prior, strict=True))
-    sizes |= dict(zip(asked.names, _turned_prior(asked), strict=True))
+    turned = _turned_prior(asked)
+    sizes |= dict(zip(asked.names, np.sqrt(np.diag(turned)), strict=True))
     if outside:
         misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
         sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance])))
@@ -154,15 +167,31 @@ def accelerometer_frame_model(
     prior, mean, restated = stated.copy(), inner.mean.copy(), inner.restated.copy()
     prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
     serving = sum(len(effect.parameters) for effect in more)
-    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving)
+    alike = _correlation(turned, np.where(asked.restated, -1, place), len(stated))
+    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving, alike=alike)
     return AccelerometerFrameModel(asked, inner, place)
 
 
 def _turned_prior(asked: ImuModel) -> Floats:
-    """Sigma of each coefficient asked for, in the accelerometers' frame; their correlation is left out.
-
-    Where the data say more than these priors, only their size matters. What six positions hardly show has the same
-    sigma with the correlation (mems_consumer: .49 deg); what they do not show at all has .85 deg in the place of .69.
-    """
+    """Covariance of the priors (SI) in the accelerometers' frame, shape (p, p)."""
     J = body_frame.frame_jacobian(asked.names, FRAME, by_temperature=False)
-    return np.asarray(np.sqrt(np.diag(J @ np.diag(asked.stated**2) @ J.T)))
+    return np.asarray(J @ np.diag(asked.stated**2) @ J.T)
+
+
+def _correlation(turned: Floats, place: Ints, count: int) -> Floats:
+    """Correlation of the priors of all `count` inner parameters, (q, q).
+
+    The turn about an axis is in three misalignments, which correlates them by one half. A test may see each of them
+    but for the turn, or one alone: what it sees then says where the others are to be expected.
+
+    Parameters
+    ----------
+    turned : ndarray, shape (p, p)
+        As `_turned_prior` gives it.
+    place : ndarray of int, shape (p,)
+        Of each parameter asked for among the inner ones; -1 where it has no part in the turn.
+    """
+    out, known = np.eye(count), np.flatnonzero((place >= 0) & (np.diag(turned) > 0.0))
+    sigma = np.sqrt(np.diag(turned)[known])
+    out[np.ix_(place[known], place[known])] = turned[np.ix_(known, known)] / np.outer(sigma, sigma)
+    return out

@@ -44,6 +44,8 @@ class ImuModel:
     serving : int
         How many of the parameters, the last ones, are no coefficients of a sensor: they are estimated along, as
         attitudes are, and not reported.
+    alike : ndarray, shape (p, p), or None
+        Correlation of the priors (dimensionless); None where they are independent.
     """
 
     effects: tuple[Effect, ...]
@@ -57,6 +59,7 @@ class ImuModel:
     decay_rate: Floats
     drive: Floats
     serving: int = 0
+    alike: Floats | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -71,7 +74,27 @@ class ImuModel:
     @property
     def weight(self) -> Floats:
         """Prior information of each coefficient (1/SI^2), shape (p,): finite for those that are known, too."""
-        return np.asarray(np.where(self.fixed, _KNOWN * self.stated, self.prior) ** -2.0)
+        return np.asarray(self._sigma**-2.0)
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlation of the priors (dimensionless), shape (p, p)."""
+        return np.eye(len(self.prior)) if self.alike is None else self.alike
+
+    @property
+    def prior_covariance(self) -> Floats:
+        """Covariance of the priors (SI), shape (p, p); rows and columns of known coefficients are zero."""
+        return np.asarray(self.correlation * np.outer(self.prior, self.prior))
+
+    @property
+    def prior_information(self) -> Floats:
+        """Inverse of the covariance of the priors (1/SI^2), shape (p, p): finite for known coefficients, too."""
+        return np.asarray(np.linalg.inv(self.correlation) / np.outer(self._sigma, self._sigma))
+
+    @property
+    def _sigma(self) -> Floats:
+        """One-sigma of each coefficient in a least squares (SI), shape (p,)."""
+        return np.where(self.fixed, _KNOWN * self.stated, self.prior)
 
     def regressors(self, motion: Motion) -> Floats:
         """Regressor columns of all effects.
@@ -222,7 +245,11 @@ def with_serving(
     first = len(sensors.parameters) + np.cumsum([0, *(len(effect.parameters) for effect in effects)])
     terms = [(t.channel, at + t.parameter) for at, effect in zip(first, effects, strict=False) for t in effect.terms]
     channel, parameter = np.array(terms, dtype=np.int64).T
-    count = len(sigmas)
+    count, before = len(sigmas), len(sensors.prior)
+    alike = None
+    if sensors.alike is not None:
+        alike = np.eye(before + count)
+        alike[:before, :before] = sensors.alike
     return ImuModel(
         (*sensors.effects, *effects),
         (*sensors.parameters, *(parameter for effect in effects for parameter in effect.parameters)),
@@ -235,6 +262,7 @@ def with_serving(
         np.concatenate([sensors.decay_rate, decay_rate]),
         np.concatenate([sensors.drive, drive]),
         sensors.serving + count,
+        alike,
     )
 
 

@@ -13,7 +13,7 @@ from sdimu_calibration.core.effects.accelerometer_frame import FRAME
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
-from sdimu_calibration.core.estimation.navigation_fit import checksum
+from sdimu_calibration.core.estimation.same_data import checksum
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, handheld_evidence, places, timetable
 from sdimu_calibration.core.evidence.information import conditioned

@@ -7,20 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
-from zlib import crc32
 
 import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
+from sdimu_calibration.core.estimation.same_data import checksum, conditions
 from sdimu_calibration.core.estimation.site_rows import at_site, with_found
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -40,6 +39,7 @@ from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History
+from sdimu_calibration.core.second_order.bend import Bend
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.site_reference import Reference
@@ -55,7 +55,7 @@ within a few per cent of it."""
 _FAST = 3.0
 """NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
 2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
-_OF_THE_PASSES = ("known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
+_OF_THE_PASSES = ("bend", "known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
@@ -171,7 +171,8 @@ class NavigationFit(Fit):
 
         What is reported follows from these.
         """
-        best = self.centring @ (self.estimate if self.noise is None else self.estimate + self.noise.deviation)
+        best = self.estimate if self.noise is None else self.estimate + self.noise.deviation
+        best = self.centring @ (best if self.bend is None else best + self.bend.mean)
         return best if self.moved is None else best + self.moved
 
     @property
@@ -179,7 +180,13 @@ class NavigationFit(Fit):
         """Covariance of `settled`, shape (q, q)."""
         T = self.centring
         C = self.estimate_covariance if self.noise is None else self.noise.covariance
+        C = C if self.bend is None else C + self.bend.covariance
         return np.asarray(T @ (C if self.doubt is None else C + self.doubt) @ T.T)
+
+    @property
+    def bend(self) -> Bend | None:
+        """What squares of coefficients that only priors decide add; None where squares do not count."""
+        return None
 
     @property
     def covariance_at_site(self) -> Floats:
@@ -450,24 +457,6 @@ class NavigationFit(Fit):
             phases.used[rows],
             output.nis[rows],
         )
-
-
-def checksum(*arrays: Floats) -> float:
-    """Give a number that other samples do not have: the same recording is known again by it."""
-    value = 0
-    for array in arrays:
-        for rows in pieces(len(array)):
-            value = crc32(np.ascontiguousarray(array[rows]).tobytes(), value)
-        let_go(array)
-    return float(value)
-
-
-def conditions(setup: TestSetup) -> float:
-    """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
-    site, imu = setup.site, setup.imu
-    sigmas = tuple(v for v in (site.latitude_sigma_rad, site.gravity_sigma_m_s2) if v)
-    place = (site.latitude_rad, site.height_m, setup.gravity, *sigmas)
-    return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 
 def _in_noise(statistics: FitStatistics) -> str:

@@ -8,8 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import bias
+from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
@@ -99,7 +100,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
         return fit.with_noise(None)
     bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)
     noisy = bare.with_noise(modes.columns)
-    deviation, covariance = _with_mean(bare, modes, fit.setup.sensors.fixed)
+    deviation, covariance = _with_mean(bare, modes, fit.setup.sensors)
     residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
     rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms
@@ -111,20 +112,22 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     return fit.with_noise(estimate)
 
 
-def _with_mean(evidence: LinearEvidence, modes: Modes, fixed: Bools) -> tuple[Floats, Floats]:
+def _with_mean(evidence: LinearEvidence, modes: Modes, sensors: ImuModel) -> tuple[Floats, Floats]:
     """Deviation of the coefficients (q,) and its covariance, a bias with the mean of its noise over all dwells.
 
-    Coefficients that are `fixed` (q,) stay as they are.
+    Coefficients that are known stay as they are.
 
     A constant part of wandering noise cannot be told from the bias, so the bias by itself means nothing in it; what
     the bias was in the mean over the test is known well.
     """
     q, r = len(evidence.weight), modes.columns.shape[1]
     W = np.hstack([evidence.W, modes.columns])
-    weight = np.append(evidence.weight, np.ones(r))
-    d = W.T @ evidence.e
-    d[:q] += evidence.weight * evidence.shift
-    estimate, covariance = Information(W.T @ W, d).estimate(np.arange(q + r), weight)
+    weight, fixed = np.append(evidence.weight, np.ones(r)), sensors.fixed
+    J, d = W.T @ W, W.T @ evidence.e
+    # The prior as it is, correlations and all: its diagonal comes with the weights.
+    J[:q, :q] += sensors.prior_information - np.diag(evidence.weight)
+    d[:q] += sensors.prior_information @ evidence.shift
+    estimate, covariance = Information(J, d).estimate(np.arange(q + r), weight)
     known = np.flatnonzero(fixed)
     covariance[known], covariance[:, known], estimate[known] = 0.0, 0.0, 0.0
     T = np.hstack([np.eye(q), np.zeros((q, r))])

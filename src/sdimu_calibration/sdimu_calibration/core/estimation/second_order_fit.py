@@ -21,10 +21,12 @@ from sdimu_calibration.core.filter.passes import Solution, motion_about
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.results import History
+from sdimu_calibration.core.second_order.bend import Bend, bend
 from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
     firm_setup,
     run_stops,
+    second_order_pass,
     solve_second_order,
 )
 
@@ -64,6 +66,17 @@ class SecondOrderFit(NavigationFit):
     def added_columns(self, count: int) -> Ints:
         """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model."""
         return self.frame_model.place[len(self.names) - count :]
+
+    @cached_property
+    def bend(self) -> Bend:  # type: ignore[override]
+        """What the squares of coefficients that only priors decide add to mean and covariance."""
+
+        def about(reference: Floats) -> tuple[Floats, Floats]:
+            at = second_order_pass(self.prepared, firm, self.alignment, last.smoothed_start, reference)
+            return at.estimate, at.covariance
+
+        last, firm = self.solution.last, firm_setup(self.setup)
+        return bend(self.setup.sensors, last.estimate, last.covariance, about)
 
     @cached_property
     def known(self) -> KnownPass:

@@ -116,7 +116,7 @@ def start_state(setup: TestSetup, start: Alignment, C_nb: Floats, reference: Flo
         for a in (6 + i, NAV + p + i):
             for b in (6 + i, NAV + p + i):
                 P[a, b] = start.filter_sigma[i] ** 2
-    P[range(NAV, NAV + p), range(NAV, NAV + p)] = setup.sensors.prior**2
+    P[NAV : NAV + p, NAV : NAV + p] = setup.sensors.prior_covariance
     shift = rotation_vector(C_nb @ start.C_nb.T)
     x[6:9] = x[NAV + p :] = -shift
     x[NAV : NAV + p] = setup.sensors.mean - reference

@@ -1,0 +1,70 @@
+"""Second order along what the priors decide: a coefficient that a test does not show bends those that go along with it.
+
+Passes end at the mode of the coefficients and give the covariance there. A misalignment that its prior of .6 deg alone
+decides has 50 ppm in its half square; the scale factors that go along with it may be known to less. With t the
+deviation of such a coefficient in its sigmas, all of them are ``x0 + b t + q t^2``: their mean is ``x0 + q``, their
+covariance ``b b' + 2 q q'`` (moments of a standard normal variable).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects.accelerometer_frame import LARGE, scales_and_angles
+from sdimu_calibration.core.effects.imu_model import ImuModel
+
+
+@dataclass(frozen=True)
+class Bend:
+    """What the squares of coefficients that only priors decide add.
+
+    Attributes
+    ----------
+    mean : ndarray, shape (q,)
+        To the coefficients (SI).
+    covariance : ndarray, shape (q, q)
+        To their covariance (SI).
+    """
+
+    mean: Floats
+    covariance: Floats
+
+
+def bend(
+    sensors: ImuModel, estimate: Floats, covariance: Floats, about: Callable[[Floats], tuple[Floats, Floats]]
+) -> Bend:
+    """Look one sigma to both sides along each coefficient whose square counts, the least known one first.
+
+    Parameters
+    ----------
+    sensors : ImuModel
+        q parameters.
+    estimate, covariance : ndarray, shapes (q,) and (q, q)
+        Where the passes ended (SI).
+    about : callable
+        Of other coefficients, shape (q,), SI: estimate and covariance, shapes as above, of one pass about these.
+    """
+    mean, more = np.zeros_like(estimate), np.zeros_like(covariance)
+    left, chosen = covariance.copy(), np.empty(0, dtype=np.int64)
+    able = scales_and_angles(sensors)
+    while len(able):
+        k = int(able[np.argmax(np.diag(left)[able])])
+        sigma = float(np.sqrt(max(left[k, k], 0.0)))
+        if sigma <= LARGE:
+            break
+        b = left[:, k] / sigma
+        chosen, able = np.append(chosen, k), able[able != k]
+        sides = [_given(*about(estimate + side * b), chosen, (estimate + side * b)[chosen]) for side in (-1.0, 1.0)]
+        q = 0.5 * (sides[0] + sides[1]) - estimate
+        mean, more, left = mean + q, more + 2.0 * np.outer(q, q), left - np.outer(b, b)
+    return Bend(mean, more)
+
+
+def _given(estimate: Floats, covariance: Floats, known: Ints, values: Floats) -> Floats:
+    """Coefficients (q,) given that some of them, `known`, have the `values`: mean of the normal distribution there."""
+    gain = np.linalg.solve(covariance[np.ix_(known, known)], covariance[known])
+    return np.asarray(estimate + gain.T @ (values - estimate[known]))
