@@ -249,6 +249,20 @@ def disturbed(
 
 
 @app.command()
+def flicker(
+    out: Annotated[Path, typer.Option(help="Folder of runs and flicker.json.")] = Path("out/study-flicker"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file, size, plan and rate.")] = 40,
+    seed: Seed = 153_001,
+    workers: Workers = 2,
+) -> None:
+    """Calibrate MEMS in one and three times the flicker of their data sheets: do the sigmas hold."""
+    from sdimu_study.flicker import CASES, STUDY
+
+    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
+    leave(out / "flicker", results, STUDY.table(results, ("all",)))
+
+
+@app.command()
 def noise(
     out: Annotated[Path, typer.Option(help="Folder of runs, noise.json, noise.md.")] = Path("out/study-noise"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of noise.")] = 40,
