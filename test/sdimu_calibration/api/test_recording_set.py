@@ -63,8 +63,11 @@ def test_a_diagnosis_of_a_set_says_what_is_known_and_what_to_record(found):
     assert found.verdict == "class of effects"
     assert {"gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"} <= set(found.known.open[0])
     assert "turn Y" in " ".join(found.advice)
-    assert found.verdict in repr(found)
+    assert f"{found.verdict}: {found.sentence}" in repr(found)
     assert "<li>" in found._repr_html_()
+    assert found.best is found.found[0]
+    family = {share.family: share.probability for share in found.probabilities.families}
+    assert 0.9 < max(family.values()) <= found.best.probability
     plan = sdimu.plan("kim18_signed", tries=2, after=found.known)
     assert plan.minutes <= 49.7 + 1e-6
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import Any
 
+from sdimu_calibration.api.diagnosed import Diagnosed
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
@@ -17,14 +17,13 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
-from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
-from sdimu_calibration.report.unknown_section import followed, unknown_of
+from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -32,7 +31,7 @@ from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
 
 
-class FitDiagnosis:
+class FitDiagnosis(Diagnosed):
     """What the model of a fit is missing.
 
     Attributes
@@ -41,6 +40,8 @@ class FitDiagnosis:
         With the evidence and both fits.
     """
 
+    core: Diagnosis
+
     def __init__(self, core: Diagnosis, delivered: Fit | None = None) -> None:
         self.core, self._delivered = core, delivered
 
@@ -48,16 +49,6 @@ class FitDiagnosis:
     def summary(self) -> DiagnosisSummary:
         """What was found, what could have been seen, advice."""
         return summarise(self.core)
-
-    @property
-    def verdict(self) -> str:
-        """The verdict in a word or two."""
-        return self.core.verdict.value
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in one sentence: what is certain, what is likely, what is open."""
-        return self.core.sentence
 
     @property
     def adequate(self) -> bool:
@@ -92,18 +83,9 @@ class FitDiagnosis:
         return standing(self.core, self.summary.found)
 
     @property
-    def probabilities(self) -> Probabilities | None:
-        """Probability of nothing missing, of each family of effects, of each kind of noise."""
-        return self.core.probabilities
-
-    @property
     def unknown(self) -> tuple[UnknownFunction, ...]:
         """Errors that no effect explains and that follow attitude, rate or temperature: mean and sigma by stretch."""
         return unknown_of(self.core)
-
-    def plot_unknown(self) -> tuple[Any, ...]:
-        """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""
-        return tuple(followed(one).as_plotly() for one in self.unknown)
 
     def plot_ranking(self) -> Any:
         """Scores of the candidates against what noise reaches (a plotly figure)."""
@@ -142,13 +124,4 @@ class FitDiagnosis:
 
     def _told(self) -> list[str]:
         """Coefficients that are one in this test, and advice, one line each."""
-        return [*self.core.after.inseparable, *(f"advice: {text}" for text in self.advice)]
-
-    def __repr__(self) -> str:
-        """Sentence and advice."""
-        return "\n".join([f"{self.verdict}: {self.sentence}", *self._told()])
-
-    def _repr_html_(self) -> str:
-        """Sentence and advice as HTML."""
-        listed = "".join(f"<li>{escape(text)}</li>" for text in self._told())
-        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.sentence)}</p><ul>{listed}</ul>"
+        return [*self.core.after.inseparable, *super()._told()]

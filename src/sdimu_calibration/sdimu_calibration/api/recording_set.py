@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from sdimu_calibration.api.diagnosed import Diagnosed
 from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.member import Member
@@ -16,10 +17,10 @@ from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, SetFinding,
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.report.unknown_section import followed
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -121,17 +122,14 @@ class JointFit(Fitted):
         return folder
 
 
-class JointDiagnosis:
+class JointDiagnosis(Diagnosed):
     """What the model of a set misses."""
+
+    core: SetDiagnosis
 
     def __init__(self, of: OpenedSet, core: SetDiagnosis) -> None:
         self.of = of
         self.core = core
-
-    @property
-    def verdict(self) -> str:
-        """The verdict in a word or two."""
-        return self.core.verdict.value
 
     @property
     def adequate(self) -> bool:
@@ -144,13 +142,16 @@ class JointDiagnosis:
         return self.core.findings
 
     @property
+    def best(self) -> SetFinding:
+        """The effect that explains most; its `label` is what ``calibrate(..., add=[...])`` takes."""
+        if not self.found:
+            raise DataError(f"nothing was found: {self.sentence}")
+        return self.found[0]
+
+    @property
     def unknown(self) -> tuple[UnknownFunction, ...]:
         """Function of the attitude that all recordings share and no effect explains: mean and sigma at all stops."""
         return self.core.unknown
-
-    def plot_unknown(self) -> tuple[Any, ...]:
-        """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""
-        return tuple(followed(one).as_plotly() for one in self.unknown)
 
     @property
     def advice(self) -> tuple[str, ...]:
@@ -176,15 +177,6 @@ class JointDiagnosis:
             write_result(part / "result.json", self.result, self.core.verdict)
             write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder
-
-    def __repr__(self) -> str:
-        """Sentence and advice."""
-        return "\n".join([f"{self.verdict}: {self.core.sentence}", *(f"advice: {text}" for text in self.advice)])
-
-    def _repr_html_(self) -> str:
-        """Sentence and advice as HTML."""
-        listed = "".join(f"<li>{escape(text)}</li>" for text in self.advice)
-        return f"<p><b>{escape(self.verdict)}.</b> {escape(self.core.sentence)}</p><ul>{listed}</ul>"
 
 
 def _summary(result: Calibration) -> SetSummary:
