@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.effects.accelerometer_frame import LARGE, scales_and_angles
+from sdimu_calibration.core.effects.accelerometer_frame import scales_and_angles
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.recording import DivergedError
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ def bend(
 ) -> Bend:
     """Look one sigma to both sides along each coefficient whose square counts, the least known one first.
 
+    The square of a scale factor or misalignment counts where it is more than the sigma of the best known one. Where the
+    passes diverge a sigma away, nothing is said of that coefficient and of those after it.
+
     Parameters
     ----------
     sensors : ImuModel
@@ -51,14 +55,19 @@ def bend(
     mean, more = np.zeros_like(estimate), np.zeros_like(covariance)
     left, chosen = covariance.copy(), np.empty(0, dtype=np.int64)
     able = scales_and_angles(sensors)
+    able = able[np.diag(covariance)[able] > 0.0]
+    least = np.sqrt(np.diag(covariance)[able]).min(initial=np.inf)
     while len(able):
         k = int(able[np.argmax(np.diag(left)[able])])
-        sigma = float(np.sqrt(max(left[k, k], 0.0)))
-        if sigma <= LARGE:
+        if left[k, k] <= least:
             break
-        b = left[:, k] / sigma
+        b = left[:, k] / np.sqrt(left[k, k])
         chosen, able = np.append(chosen, k), able[able != k]
-        sides = [_given(*about(estimate + side * b), chosen, (estimate + side * b)[chosen]) for side in (-1.0, 1.0)]
+        points = [estimate - b, estimate + b]
+        try:
+            sides = [_given(*about(point), chosen, point[chosen]) for point in points]
+        except DivergedError:
+            break
         q = 0.5 * (sides[0] + sides[1]) - estimate
         mean, more, left = mean + q, more + 2.0 * np.outer(q, q), left - np.outer(b, b)
     return Bend(mean, more)
