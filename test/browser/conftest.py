@@ -140,9 +140,33 @@ def broken_rules(page: Any) -> list[str]:
     ]
 
 
+_SEEN = """number => {
+    const seen = document.querySelector('#ranking .js-plotly-plot')._hoverdata;
+    return Boolean(seen) && seen[0].pointNumber === number;
+}"""
+"""Whether the mouse is on a bar, as the figure sees it."""
+
+
 def settle(page: Any) -> None:
     """Wait until nothing is being worked on, verdict and candidates included."""
     # One callback follows another: still the same after a moment means the last one is done.
     for _ in range(3):
         page.wait_for_function(_SETTLED)
         page.wait_for_timeout(300)
+
+
+def click_bar(page: Any, number: int) -> None:
+    """Click a bar of the ranking once the figure sees the mouse on it: a click before that is lost."""
+    bar = page.locator("#ranking .point path").nth(number)
+    for _ in range(50):
+        # Plotly listens on a layer above the bars, so the place is clicked, not the element.
+        bar.evaluate("bar => bar.scrollIntoView({block: 'center'})")
+        box = bar.bounding_box()
+        middle = (box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        page.mouse.move(box["x"] + 0.4 * box["width"], middle[1])
+        page.mouse.move(*middle)
+        page.wait_for_timeout(200)
+        if page.evaluate(_SEEN, number):
+            page.mouse.click(*middle)
+            return
+    raise AssertionError(f"the ranking does not see the mouse on bar {number}")

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from .conftest import HIDDEN, START_S, Workbench, sdimu, serving, settle
+from .conftest import HIDDEN, START_S, Workbench, click_bar, sdimu, serving, settle
 
 OWN = """format: sdimu-effect/1
 name: bent
@@ -37,15 +37,6 @@ def drawn(page: Any, name: str, what: str) -> Any:
 def held_out(page: Any) -> float:
     """Last error with one stop left out in the line of numbers."""
     return [float(number) for number in re.findall(r"[\d.]+(?= sigma)", text(page, "numbers"))][-1]
-
-
-def click_bar(page: Any, number: int) -> None:
-    # Plotly listens on a layer above the bars, so the place is clicked, not the element.
-    bar = page.locator("#ranking .point path").nth(number)
-    bar.evaluate("bar => bar.scrollIntoView({block: 'center'})")
-    box = bar.bounding_box()
-    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.5 * box["height"])
-    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
 
 
 def click_cell(page: Any, channel: str, stop: str) -> None:
