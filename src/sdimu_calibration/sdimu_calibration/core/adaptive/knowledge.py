@@ -26,7 +26,7 @@ from sdimu_calibration.core.wording import Option
 _MOST_ALIKE = 6
 """Number of look-alikes of a class that are simulated: those nearest to the one that was found."""
 _ROOM = 30.0
-"""Prior of a candidate over the size that physics gives it (1): its size is the data's to say."""
+"""Prior of a candidate over the size that physics gives it (1): so wide that the data decide its size."""
 CLEAR = 2.0
 """Difference of log Bayes factors (1) beyond the one that tells two candidates apart: what noise may take back."""
 

@@ -16,8 +16,8 @@ from sdimu_calibration.core.posterior.models import gains
 from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE
 
 _PROVEN = 30.0
-"""Factor on the physical prior of a chosen effect: its size is the data's to say, and what a prior holds back of it
-looks like companions."""
+"""Factor on the physical prior of a chosen effect: so wide that the data decide its size. What a narrow prior holds
+back looks like further effects."""
 
 
 class Problem(Generic[E]):

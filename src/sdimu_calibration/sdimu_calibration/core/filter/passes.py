@@ -364,7 +364,7 @@ _BEYOND = 3.0
 _PULL = 0.1
 """Shift of an estimate by its prior (sigma of the estimate) from which the passes are repeated: less is not seen."""
 ROOM = 10.0
-"""New sigma of a contradicted prior, as a multiple of the estimate: it then says nothing."""
+"""New sigma of a contradicted prior, as a multiple of the estimate: so wide that the prior holds nothing back."""
 MOST_WIDENINGS = 3
 """Number of times at most that priors are widened and the passes repeated: a widened prior holds nothing back, so a
 next time is for coefficients that the first ones had hidden."""
