@@ -45,6 +45,14 @@ def conduct(
     }
 
 
+def conduct_as_table(
+    study: Study[Any, Any, Any], cases: Mapping[Any, Any], seeds: Sequence[int], out: Path, workers: int
+) -> None:
+    """Run every case of a study, and leave its rows and one table with a last line of all."""
+    results = conduct(study, cases, seeds, out, workers)
+    leave(out / study.name, results, study.table(results, ("all",)))
+
+
 def check_kinds(asked: Collection[str] | None, known: Collection[str]) -> None:
     """Refuse a kind of test that there is not."""
     from sdimu_calibration.core.recording import DataError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
-from sdimu_study.cli.conduct import check_kinds, conduct, imu_files, leave
+from sdimu_study.cli.conduct import check_kinds, conduct, conduct_as_table, imu_files, leave
 
 if TYPE_CHECKING:
     from sdimu_study.study import Key, Row
@@ -244,8 +244,7 @@ def disturbed(
     """Diagnose tests on benches that are not ideal: site told wrong, table that vibrates, stamps that jitter."""
     from sdimu_study.disturbed import CASES, STUDY
 
-    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
-    leave(out / "disturbed", results, STUDY.table(results, ("all",)))
+    conduct_as_table(STUDY, CASES, range(seed, seed + runs), out, workers)
 
 
 @app.command()
@@ -258,8 +257,7 @@ def flicker(
     """Calibrate MEMS in one and three times the flicker of their data sheets: do the sigmas hold."""
     from sdimu_study.flicker import CASES, STUDY
 
-    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
-    leave(out / "flicker", results, STUDY.table(results, ("all",)))
+    conduct_as_table(STUDY, CASES, range(seed, seed + runs), out, workers)
 
 
 @app.command()
@@ -383,8 +381,7 @@ def static(
     check_kinds(kind, KINDS)
     wanted = imu_files(imu)
     cases = {key: case for key, case in CASES.items() if key[0] in (kind or KINDS) and key[1] in wanted}
-    results = conduct(STUDY, cases, range(seed, seed + runs), out, workers)
-    leave(out / "static", results, STUDY.table(results, ("all",)))
+    conduct_as_table(STUDY, cases, range(seed, seed + runs), out, workers)
 
 
 @app.command()
@@ -397,5 +394,4 @@ def trembling(
     """Calibrate runs by hand of which up to half of the rests tremble, and with the rests known beside it."""
     from sdimu_study.trembling import CASES, STUDY
 
-    results = conduct(STUDY, CASES, range(seed, seed + runs), out, workers)
-    leave(out / "trembling", results, STUDY.table(results, ("all",)))
+    conduct_as_table(STUDY, CASES, range(seed, seed + runs), out, workers)

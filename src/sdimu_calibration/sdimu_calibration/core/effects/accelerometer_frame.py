@@ -167,8 +167,8 @@ def accelerometer_frame_model(
     prior, mean, restated = stated.copy(), inner.mean.copy(), inner.restated.copy()
     prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
     serving = sum(len(effect.parameters) for effect in more)
-    alike = _correlation(turned, np.where(asked.restated, -1, place), len(stated))
-    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving, alike=alike)
+    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving)
+    inner = replace(inner, correlation=_correlation(turned, np.where(asked.restated, -1, place), len(stated)))
     return AccelerometerFrameModel(asked, inner, place)
 
 

@@ -41,11 +41,11 @@ class ImuModel:
         1/s; zero for constants and random walks.
     drive : ndarray, shape (p,)
         Variance that a random walk adds per second (SI^2/s); zero for all other parameters.
+    correlation : ndarray, shape (p, p)
+        Of the priors (dimensionless).
     serving : int
         How many of the parameters, the last ones, are no coefficients of a sensor: they are estimated along, as
         attitudes are, and not reported.
-    alike : ndarray, shape (p, p), or None
-        Correlation of the priors (dimensionless); None where they are independent.
     """
 
     effects: tuple[Effect, ...]
@@ -58,8 +58,8 @@ class ImuModel:
     stated: Floats
     decay_rate: Floats
     drive: Floats
+    correlation: Floats
     serving: int = 0
-    alike: Floats | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -75,11 +75,6 @@ class ImuModel:
     def weight(self) -> Floats:
         """Prior information of each coefficient (1/SI^2), shape (p,): finite for those that are known, too."""
         return np.asarray(self._sigma**-2.0)
-
-    @property
-    def correlation(self) -> Floats:
-        """Correlation of the priors (dimensionless), shape (p, p)."""
-        return np.eye(len(self.prior)) if self.alike is None else self.alike
 
     @property
     def prior_covariance(self) -> Floats:
@@ -193,6 +188,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         np.array(prior),
         np.array(decay),
         np.array(drive),
+        np.eye(len(prior)),
     )
 
 
@@ -246,10 +242,8 @@ def with_serving(
     terms = [(t.channel, at + t.parameter) for at, effect in zip(first, effects, strict=False) for t in effect.terms]
     channel, parameter = np.array(terms, dtype=np.int64).T
     count, before = len(sigmas), len(sensors.prior)
-    alike = None
-    if sensors.alike is not None:
-        alike = np.eye(before + count)
-        alike[:before, :before] = sensors.alike
+    correlation = np.eye(before + count)
+    correlation[:before, :before] = sensors.correlation
     return ImuModel(
         (*sensors.effects, *effects),
         (*sensors.parameters, *(parameter for effect in effects for parameter in effect.parameters)),
@@ -261,8 +255,8 @@ def with_serving(
         np.concatenate([sensors.stated, sigmas]),
         np.concatenate([sensors.decay_rate, decay_rate]),
         np.concatenate([sensors.drive, drive]),
+        correlation,
         sensors.serving + count,
-        alike,
     )
 
 
