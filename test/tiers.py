@@ -30,9 +30,11 @@ LONG = {
     ),
     "test/sdimu_calibration/core/joint/test_function_fit.py": (
         "test_it_changes_next_to_nothing_where_nothing_is_left",
-        "test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attitudes",
+        "test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_attitudes",
     ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
+        "test_six_rests_of_a_cube_are_a_set",
+        "test_static_recordings_are_diagnosed",
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_consumer-1]",
     ),
     "test/sdimu_calibration/core/posterior/test_models.py": (
@@ -194,6 +196,8 @@ LONG = {
     "test/sdimu_calibration/core/joint/test_set_search.py": (
         "test_a_clean_set_is_consistent",
         "test_a_fault_of_one_recording_is_told_of_that_one",
+        "test_taking_back_effects_keeps_the_fault_of_one_recording",
+        "test_what_all_have_and_one_has_more_of_is_told_as_both",
         "test_a_weak_effect_is_found_in_all_recordings_together",
         "test_what_two_recordings_leave_open_the_advised_third_one_closes",
     ),

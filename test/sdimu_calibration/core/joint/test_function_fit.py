@@ -71,12 +71,11 @@ def test_it_changes_next_to_nothing_where_nothing_is_left(options):
     np.testing.assert_array_less(grown, 2.0)
 
 
-def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attitudes(options):
-    """Stops do not come back then: by them three false effects were certain, and scale factors 12 sigma off."""
+def test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_attitudes(options):
+    """With noise that each recording learned by itself three false effects were certain, and scales 12 sigma off."""
     wave = unit_set(41, [short("kim18_signed"), short("recommended")], ("accel_x: sin(7 fx/g + 4 fy/g)=40 ug",))
     found = diagnose_set(wave.members, options, here)
     assert found.recurrence is not None
-    assert found.recurrence.answer == ()
     assert found.verdict == Verdict.UNEXPLAINED
     assert found.findings == ()
     check_drawn(found)
@@ -84,7 +83,6 @@ def test_a_diagnosis_takes_back_what_imitates_it_where_two_plans_share_few_attit
     assert found.probabilities is None
     assert found.advice[0].kind == Kind.TRY_FORCE_EQUATION
     assert all(f.label in found.sentence for f in found.refused)
-    assert len(found.refused) > 0
     assert any(
         note.startswith("estimated beside an unknown function of the attitude in accel_x") for note in found.after.notes
     )

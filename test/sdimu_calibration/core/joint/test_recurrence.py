@@ -134,7 +134,7 @@ def test_a_set_says_what_comes_back(tmp_path):
     assert "it belongs to the sensor" in found.sentence
     # What imitates the sine in these stops predicts the other recording worse.
     assert not found.findings
-    assert "The model stays as given: with accel_" in found.sentence
+    assert "explains it. It also explains accel_" in found.sentence
     np.testing.assert_array_equal(found.after.values, found.before.values)
     assert any("--try FILE" in line for line in map(sentence, found.advice))
     write_set_diagnosis(tmp_path / "set.json", found)

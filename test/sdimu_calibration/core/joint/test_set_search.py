@@ -13,6 +13,7 @@ from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import load_model
 
@@ -51,7 +52,27 @@ def test_a_fault_of_one_recording_is_told_of_that_one(options):
     assert "r2" in found.sentence
 
 
-@pytest.mark.slow
+def of(found, name):
+    """Value and sigma of a coefficient of a search (deg/h/h)."""
+    fit = found.after
+    place = fit.names.index(name)
+    sigma = float(np.sqrt(fit.estimate.covariance[place, place]))
+    return fit.estimate.values[place] / to_si(1.0, "deg/h/h"), sigma / to_si(1.0, "deg/h/h")
+
+
+def test_what_all_have_and_one_has_more_of_is_told_as_both(options):
+    """Found in one recording first, which alone takes it for a random walk."""
+    some = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=0.25 deg/h/h",))
+    more = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=1.2 deg/h/h",))
+    found = search_set((*some.members[:2], more.members[2]), options, here)
+    assert [c.label for c in found.chosen] == ["gyro_bias_ramp_x"]
+    assert [one.label for one in found.local] == ["gyro_bias_ramp_x@r2"]
+    for name, true in (("gyro_bias_ramp_x", 0.25), ("gyro_bias_ramp_x@r2", 1.2)):
+        value, sigma = of(found, name)
+        assert abs(value - true) < 4.0 * sigma
+    assert not any(r.noise for r in found.after.reports)
+
+
 def test_taking_back_effects_keeps_the_fault_of_one_recording(options):
     bad = unit_set(33, [short()] * 3, ("gyro_bias_step_x(t0=400 s)=0.3 deg/h",))
     members = (*unit_set(33, [short()] * 3).members[:2], bad.members[2])

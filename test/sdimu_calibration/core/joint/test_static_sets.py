@@ -84,14 +84,12 @@ def test_recordings_of_which_none_knows_an_azimuth_are_a_set(seed):
     assert without_azimuth(fit) == ["r0", "r1"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *SEEDS])
 @pytest.mark.parametrize("grade", GRADES)
 def test_six_rests_of_a_cube_are_a_set(grade, seed):
     checked(rests(grade, seed, CUBE), grade, seed, CUBE)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("grade", GRADES)
 def test_static_recordings_are_diagnosed(grade):
     found = diagnose_set(rests(grade, 1, PAIR), OPTIONS, here)

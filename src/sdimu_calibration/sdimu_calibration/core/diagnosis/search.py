@@ -6,7 +6,7 @@ nearly certain. Everything else stays in the window of models, and in the sigmas
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic
 
@@ -77,6 +77,7 @@ def search(
     limit: float | None = None,
     earlier: Search[E] | None = None,
     tell_noise: bool = True,
+    make: type[Board[E]] | Callable[..., Board[E]] = Board,
 ) -> Search[E]:
     """Find the models that the data leave probable, and choose of them what is told.
 
@@ -94,12 +95,14 @@ def search(
         About a point that differs little, with the same signatures or the first ones of them.
     tell_noise : bool
         Noise with a memory is told; without it is a rival of effects alone, for a fit that learns its scatter as white.
+    make : callable
+        Makes the board, of the parameters of `Board`.
     """
     if earlier and earlier.joint and earlier.joint.wander is not wander:
         # Of other stretches neither information nor kinds of noise hold.
         earlier = None
     joint = earlier.joint if earlier else None
-    found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None)
+    found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None, make)
     board = found.board
     terms = told_noise(found) if tell_noise else ()
     noisy = in_noise(board, terms)

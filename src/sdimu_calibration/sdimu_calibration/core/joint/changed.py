@@ -91,7 +91,13 @@ def with_changes(reports: Sequence[Report], stable: Sequence[Effect]) -> tuple[l
         own = [(k, keys[n]) for k, n in enumerate(report.reduction.names) if n in keys]
         new = [tagged(label, report.name) for _, label in own]
         rows = report.reduction
-        A = np.hstack([rows.A, rows.A[:, [k for k, _ in own]]])
-        out.append(replace(report, reduction=replace(rows, A=A, labels=(*rows.labels, *new))))
+        same = [k for k, _ in own]
+        A = np.hstack([rows.A, rows.A[:, same]])
+        rivals = [
+            replace(one, names=(*one.names, *new), columns=np.concatenate([one.columns, one.columns[same]]))
+            for one in report.rivals
+        ]
+        changed = replace(rows, A=A, labels=(*rows.labels, *new))
+        out.append(replace(report, reduction=changed, rivals=tuple(rivals)))
         labels += new
     return out, labels

@@ -25,6 +25,7 @@ from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
+from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
 from sdimu_calibration.core.joint.shared_function import SharedFunction, function_rows
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
@@ -84,6 +85,8 @@ class Job:
         Where an earlier fit of the recording ended: gives the attitude.
     noise : tuple of NoiseTerm or None
         Noise with a memory, where it is known; None learns it.
+    rivals : bool
+        Also what the recording says in each noise that it may have.
     """
 
     member: Member
@@ -98,6 +101,7 @@ class Job:
     noise: tuple[NoiseTerm, ...] | None = None
     stretches: bool = False
     function: SharedFunction | None = None
+    rivals: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,9 @@ class Report:
         The recording alone contradicts priors of the IMU file.
     places : Places or None
         Of its dwells and turns, where they were asked for.
+    rivals : tuple of InOneNoise
+        What it says in each noise that it may have, where it was asked for; empty for a run by hand, which learns its
+        scatter instead.
     """
 
     name: str
@@ -155,6 +162,7 @@ class Report:
     widened: bool = False
     places: Places | None = None
     site: Site | None = None
+    rivals: tuple[InOneNoise, ...] = ()
 
     @property
     def stands_alone(self) -> bool:
@@ -229,18 +237,23 @@ def _report(job: Job, fit: Fit) -> Report:
     tried_in_all = _of_all(job.candidates, job)
     shared = [selection.resolve(e) if isinstance(e, str) else e for e in tried_in_all]
     own = _local_candidates(fit) if job.with_local else []
+    rivals: tuple[InOneNoise, ...] = ()
     if job.stretches:
         found, places = stretch_rows(fit)
     elif job.function is not None:
         found, places = function_rows(fit, job.function), None
     else:
-        found, places = reduced(fit.evidence([*shared, *own]), fit.noise_terms), None
+        evidence = fit.evidence([*shared, *own])
+        found, places = reduced(evidence, fit.noise_terms), None
+        if job.rivals and fit.estimator != HandheldFit.estimator:
+            rivals = rival_noises(evidence, fit.noise_terms)
     log = recording.temperature
+    rows = _named(found, job, shared)
     return Report(
         name,
         job.member.serial,
         job.member.power_on,
-        _named(found, job, shared),
+        rows,
         fit.estimator,
         fit.reason,
         fit.test.imu,
@@ -260,6 +273,7 @@ def _report(job: Job, fit: Fit) -> Report:
         _widened(fit),
         places,
         fit.test.site,
+        tuple(replace(one, names=(*rows.names, *rows.labels)) for one in rivals),
     )
 
 

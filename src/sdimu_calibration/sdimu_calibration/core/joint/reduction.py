@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
@@ -70,8 +70,7 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
         Noise with a memory that was learned in the recording.
     """
     own = len(evidence.weight)
-    apart = [k < evidence.coefficients or name in SITE_REFERENCES for k, name in enumerate(evidence.names[:own])]
-    kept, others = np.flatnonzero(apart), np.flatnonzero(np.logical_not(apart))
+    kept, others = kept_and_others(evidence)
     order, p = np.concatenate([kept, others, np.arange(own, evidence.W.shape[1])]), len(kept)
     columns = whitened(np.column_stack([evidence.W[:, order], evidence.e]), evidence, terms)
     if own > p:
@@ -89,6 +88,19 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
         len(evidence.e),
         float(e @ e - y @ y),
     )
+
+
+def kept_and_others(evidence: LinearEvidence) -> tuple[Ints, Ints]:
+    """Tell what all recordings share of a model from what is of the recording alone, as its attitude.
+
+    Returns
+    -------
+    kept, others : ndarray of int, shapes (p,) and (o,)
+        Columns of the evidence.
+    """
+    own = evidence.names[: len(evidence.weight)]
+    apart = [k < evidence.coefficients or name in SITE_REFERENCES for k, name in enumerate(own)]
+    return np.flatnonzero(apart), np.flatnonzero(np.logical_not(apart))
 
 
 def compressed(W: Floats, e: Floats) -> tuple[Floats, Floats]:

@@ -250,6 +250,9 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
     if about is None:
         return Job(member, options.model, estimator or options.estimator, local)
     report = next((r for r in about.reports if r.name == member.name), None)
+    if report is not None and local != tuple(about.local.get(member.name, ())):
+        # What is new in it alone may be far outside its prior, which its own fit widens: else noise takes the rest.
+        return Job(member, options.model, report.estimator, local, imu=report.imu)
     if report is not None:
         return Job(
             member,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
+from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
@@ -138,9 +140,13 @@ def search_set(
     first: Search[SetEvidence] | None = None
     for turn in range(_MOST_ROUNDS):
         progress("candidates", min(0.9, 0.4 + 0.1 * turn))
-        evidence = _evidence(fit, extra, finer, run)
-        again = evidence.as_candidates(*_reopened(evidence, told))
-        found = with_steps(search(again, _singles(again), alpha=alpha, earlier=found))
+        full, evidence = _evidence(fit, extra, finer, run)
+        columns, tried = _reopened(evidence, told)
+        again = evidence.as_candidates(columns, tried)
+        names = {c.label: evidence.names[column] for c, column in zip(tried, columns.tolist(), strict=True)}
+        boards, limit = partial(SetBoard, full, names), first.threshold if first else None
+        found = search(again, _singles(again), None, alpha, limit, found, tell_noise=False, make=boards)
+        found = with_steps(found)
         first = first or found
         chosen = _first_ones(fit, found, told)
         nearer = _nearer(chosen, told, finer)
@@ -201,25 +207,43 @@ def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:
         if one.recording:
             local[one.recording] = (*local.get(one.recording, ()), split_tag(one.label)[0])
     shared = [by_name(c.effect) for c in told if not c.recording]
-    return replace(options, model=with_effects(options.model, shared), local=local)
+    # The same in all recordings, or another one in some: so the search weighs it, and a scatter of power-ons would take
+    # the place of its mean where the prior is too narrow for that.
+    scopes = {c.effect.family or c.effect.name: "unit" for c in told if not c.recording}
+    model = with_effects(options.model, shared)
+    return replace(options, model=model, local=local, scopes={**scopes, **options.scopes})
 
 
-def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run: Run) -> SetEvidence:
-    """Take the evidence about a fit, with all that its model may lack in all recordings or in one."""
+def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run: Run) -> tuple[SetFit, SetEvidence]:
+    """Take the evidence about a fit, with all that its model may lack in all recordings or in one.
+
+    Returns
+    -------
+    full : SetFit
+        Its reports have the signatures of the candidates, and what each recording says in each noise.
+    evidence : SetEvidence
+    """
     effects = _candidates(fit, extra, finer)
     full = _gathered(fit, effects, run)
     local = [_of_one(label) for report in full.reports for label in report.reduction.labels if split_tag(label)[1]]
     reports, labels = with_changes(full.reports, stable_effects(full.model, full.varying))
     changes = [change_of(label, reports[0].imu) for label in labels]
     shared = [c for effect in effects for c in split(effect)]
-    return set_evidence(replace(full, reports=tuple(reports)), shared, [*local, *changes])
+    full = replace(full, reports=tuple(reports))
+    return full, set_evidence(full, shared, [*local, *changes])
 
 
 def _of_one(label: str) -> Candidate:
     """Candidate of one recording, by its label."""
     key, recording = split_tag(label)
+    return replace(_by_key(key), label=label, recording=recording)
+
+
+@lru_cache(maxsize=4096)
+def _by_key(key: str) -> Candidate:
+    """Candidate of a key of one parameter: every recording has the same."""
     (one,) = split(selection.resolve(key))
-    return replace(one, label=label, recording=recording)
+    return one
 
 
 def _reopened(evidence: SetEvidence, told: Sequence[Candidate]) -> tuple[Ints, list[Candidate]]:
@@ -274,15 +298,13 @@ def _singles(evidence: SetEvidence) -> Ints:
     p = len(evidence.weight)
     J = evidence.information.J[p:, p:]
     unit = 1.0 / np.sqrt(np.maximum(np.diag(J), 1e-300))
-    likeness = np.abs(J * np.outer(unit, unit))
     of_sets = np.array([c.effect.tried_in == "set" for c in evidence.candidates], dtype=bool)
     # Those of sets come behind all others they may be, the powers in their order.
-    order = np.concatenate([np.flatnonzero(~of_sets), np.flatnonzero(of_sets)])
-    kept: list[int] = []
-    for k in order.tolist():
-        if not of_sets[k] or not kept or likeness[k, kept].max() < _DOUBLE:
-            kept.append(k)
-    return np.array(sorted(kept), dtype=np.int64) + p
+    kept = np.flatnonzero(~of_sets)
+    for k in np.flatnonzero(of_sets).tolist():
+        if not len(kept) or np.max(np.abs(J[k, kept]) * unit[k] * unit[kept]) < _DOUBLE:
+            kept = np.append(kept, k)
+    return np.sort(kept) + p
 
 
 def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -> list[Effect]:
@@ -305,7 +327,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
 def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     """Return the fit with the signatures of effects in its reports."""
     # The search looks at what is left of these rows, not of those before.
-    return with_reports(fit, asked_again(fit, run, candidates=tuple(map(by_name, tried)), with_local=True))
+    return with_reports(fit, asked_again(fit, run, candidates=tuple(map(by_name, tried)), with_local=True, rivals=True))
 
 
 def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:

@@ -83,6 +83,11 @@ class Board(Generic[E]):
         self._data: dict[NoiseModel, tuple[float, Data]] = {}
         self._in_noise: dict[NoiseModel, InNoise] = {}
 
+    @property
+    def has_noises(self) -> bool:
+        """Whether noise with a memory may be in a model."""
+        return self.wander is not None
+
     def in_excess(self, excess: float) -> Board[E]:
         """Return the board with all noise larger than the models of it say.
 
@@ -112,11 +117,17 @@ class Board(Generic[E]):
         at = np.array([*range(len(evidence.weight)), *(len(evidence.weight) + k for k, _ in members)], dtype=np.int64)
         _, weight = self.parameters(members)
         A, d = one.J[np.ix_(at, at)] + np.diag(weight), one.d[at]
+        prior = float(evidence.weight @ evidence.shift**2)
+        squares, rows = self.squares(noise)
+        left = squares + prior - float(d @ solved(A, d[:, None])[:, 0])
+        return max(left / max(rows - len(members), 1), 1.0)
+
+    def squares(self, noise: NoiseModel) -> tuple[float, int]:
+        """Sum of the squared residuals with no effect added, in a noise (1), and their number."""
+        e, one = self.evidence.e, self.as_stated.in_noise(noise)
         # The modes take y' M^-1 y of the square sum: u = M^-1 y, and `inverse` is M^-1.
         modes = float(one.u @ np.linalg.solve(one.inverse, one.u)) if one.u.size else 0.0
-        prior = float(evidence.weight @ evidence.shift**2)
-        left = float(evidence.e @ evidence.e) - modes + prior - float(d @ solved(A, d[:, None])[:, 0])
-        return max(left / max(len(evidence.e) - len(members), 1), 1.0)
+        return float(e @ e) - modes, len(e)
 
     @cached_property
     def _nothing(self) -> NoiseInformation:
@@ -127,7 +138,17 @@ class Board(Generic[E]):
 
     @cached_property
     def use(self) -> Ints:
-        """Columns of the evidence that the coefficients do not take up, in the order of the candidates of `data`.
+        """Columns of the evidence that may be in a model, in the order of the candidates of `data`.
+
+        Returns
+        -------
+        ndarray of int, shape (u,)
+        """
+        return self.testable
+
+    @cached_property
+    def testable(self) -> Ints:
+        """Columns of the evidence that the coefficients do not take up.
 
         Returns
         -------
@@ -156,8 +177,23 @@ class Board(Generic[E]):
         ndarray, shape (u,)
             SI.
         """
-        size = self.evidence.prior[self.use - len(self.evidence.weight)].copy()
-        J = np.diag(self.evidence.information.J)[self.use]
+        return self.sizes_of(self.use)
+
+    def sizes_of(self, columns: Ints) -> Floats:
+        """One-sigma size of candidates that the data see at all.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (k,)
+            Of the evidence.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            SI.
+        """
+        size = self.evidence.prior[columns - len(self.evidence.weight)].copy()
+        J = np.diag(self.evidence.information.J)[columns]
         unknown = ~np.isfinite(size)
         size[unknown] = UNKNOWN_SIZE / np.sqrt(J[unknown])
         return np.asarray(size)
@@ -176,7 +212,7 @@ class Board(Generic[E]):
         """Information on coefficients and candidates in a noise."""
         if noise not in self._in_noise:
             as_stated = self.as_stated is self
-            self._in_noise[noise] = self._worked_out(noise) if as_stated else self._in_excess(noise)
+            self._in_noise[noise] = self.worked_out(noise) if as_stated else self._in_excess(noise)
         return self._in_noise[noise]
 
     def _in_excess(self, noise: NoiseModel) -> InNoise:
@@ -187,7 +223,8 @@ class Board(Generic[E]):
         d = (one.d - pull) / self.excess + pull
         return replace(one, J=one.J / self.excess, d=d, inverse=one.inverse * self.excess)
 
-    def _worked_out(self, noise: NoiseModel) -> InNoise:
+    def worked_out(self, noise: NoiseModel) -> InNoise:
+        """Work out the information in a noise as its model states it."""
         keep, full = self.keep, self.evidence.information
         J, d = full.J[np.ix_(keep, keep)], full.d[keep]
         if not noise.terms or self.joint is None or self.wander is None:
@@ -204,13 +241,17 @@ class Board(Generic[E]):
         """Log posterior of no effect in a noise, over that in white noise; and the candidates in it."""
         if noise not in self._data:
             evidence, p, one = self.evidence, len(self.evidence.weight), self.in_noise(noise)
-            offset = noise.log_prior
-            if noise.terms and self.joint is not None and self.wander is not None:
-                offset += (likelihood(self._nothing, self.wander.cut, noise.terms) - self._nothing.fitted) / self.excess
+            offset = noise.log_prior + self.likelihood(noise) / self.excess
             given = Information(one.J, one.d).given(np.arange(p), evidence.weight)
             scaled = np.ascontiguousarray(given.J[p:, p:] * np.outer(self.size, self.size))
             self._data[noise] = offset, Data(scaled, given.d[p:] * self.size, self.prior)
         return self._data[noise]
+
+    def likelihood(self, noise: NoiseModel) -> float:
+        """Log likelihood (1) of no effect in a noise, over that in white noise."""
+        if not noise.terms or self.joint is None or self.wander is None:
+            return 0.0
+        return likelihood(self._nothing, self.wander.cut, noise.terms) - self._nothing.fitted
 
     def columns(self, members: Members) -> list[int]:
         """Columns of the evidence of the members of a model."""
@@ -283,7 +324,6 @@ class Board(Generic[E]):
 
 def same_noise(one: NoiseModel, other: NoiseModel, ratio: float = 1.35) -> bool:
     """Whether two noises have the same terms, of sizes within a factor."""
-    if one.kinds != other.kinds:
+    if one.key != other.key:
         return False
-    sizes = {t.identity: t.size for t in other.terms}
-    return all(1.0 / ratio < t.size / sizes[t.identity] < ratio for t in one.terms)
+    return all(1.0 / ratio < size / other.sizes[kind] < ratio for kind, size in one.sizes.items())

@@ -7,7 +7,7 @@ share of the prior that lies where the likelihood does: so the best size stands 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product, repeat
 
@@ -98,6 +98,16 @@ class NoiseModel:
 
     terms: tuple[NoiseTerm, ...] = ()
     log_prior: float = 0.0
+
+    @property
+    def sizes(self) -> Mapping[Hashable, float]:
+        """Size of each term (SI), by what it is."""
+        return {t.identity: t.size for t in self.terms}
+
+    @property
+    def key(self) -> frozenset[Hashable]:
+        """What each term is and where, its size aside."""
+        return frozenset(self.sizes)
 
     @property
     def kinds(self) -> frozenset[Identity]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic
@@ -15,7 +15,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
-from sdimu_calibration.core.noise_term import KINDS, Identity, NoiseTerm
+from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
@@ -158,11 +158,11 @@ class Posterior(Generic[E]):
         list of dict of str to (int, bool)
             Of each the width of each member, and whether it was made between those of a scan; by label.
         """
-        likeliest: dict[frozenset[Identity], Weighed] = {}
-        share: dict[frozenset[Identity], float] = {}
+        likeliest: dict[frozenset[Hashable], Weighed] = {}
+        share: dict[frozenset[Hashable], float] = {}
         for model in self.models:
-            likeliest.setdefault(model.noise.kinds, model)
-            share[model.noise.kinds] = share.get(model.noise.kinds, 0.0) + model.probability
+            likeliest.setdefault(model.noise.key, model)
+            share[model.noise.key] = share.get(model.noise.key, 0.0) + model.probability
         others = [likeliest[kinds] for kinds, p in share.items() if p > _OPEN]
         return [self._labels(model) for model in (self.told, *others)]
 
@@ -236,7 +236,12 @@ class Posterior(Generic[E]):
 
 
 def posterior(
-    evidence: E, allowed: Ints, wander: Wander | None, earlier: Joint | None = None, before: Posterior[E] | None = None
+    evidence: E,
+    allowed: Ints,
+    wander: Wander | None,
+    earlier: Joint | None = None,
+    before: Posterior[E] | None = None,
+    make: type[Board[E]] | Callable[..., Board[E]] = Board,
 ) -> Posterior[E]:
     """Find the models that an evidence leaves probable.
 
@@ -252,12 +257,14 @@ def posterior(
         Of an evidence with the same signatures, or the first ones of them.
     before : Posterior, optional
         About a point that differs little: the search begins with its likeliest models, and with its kinds of noise.
+    make : callable
+        Makes the board, of the parameters of `Board`.
     """
     begun: list[dict[str, tuple[int, bool]]] = [{}] if before is None else before.starts()
     labels = {label: own for one in begun for label, own in one.items()}
     first = len(evidence.weight)
     finer = {c for c in allowed.tolist() if labels.get(evidence.candidates[c - first].label, (0, False))[1]}
-    board = Board(evidence, allowed, frozenset(finer), wander, earlier)
+    board = make(evidence, allowed, frozenset(finer), wander, earlier)
     number = {evidence.candidates[c - first].label: k for k, c in enumerate(board.use.tolist())}
     named = [tuple(sorted((number[name], own[0]) for name, own in one.items() if name in number)) for one in begun]
     # About another point two of a start may be one, or a size have the other sign: that is no model any more.
@@ -287,6 +294,12 @@ def posterior(
     return Posterior(board, models, _noises(models, beside))
 
 
+def noises_of(board: Board[E]) -> list[NoiseModel]:
+    """Find the noises that are probable beside the best effects, the likeliest first, then those beside none."""
+    noises, _, beside = _climbed(board, [()])
+    return [*noises, *(noise for _, noise in beside), *(noise for _, noise in board.noises(()))]
+
+
 def _has_functions(wander: Wander | None) -> bool:
     return wander is not None and wander.cut.functions is not None
 
@@ -304,14 +317,14 @@ def _noises(
     weight: dict[NoiseModel, float] = {}
     for model in models:
         weight[model.noise] = weight.get(model.noise, 0.0) + model.probability
-    kinds = {noise.kinds for noise in weight}
-    score = {noise.kinds: score for score, noise in reversed(beside)}
-    known = [noise for noise in weight if noise.kinds in score]
+    kinds = {noise.key for noise in weight}
+    score = {noise.key: score for score, noise in reversed(beside)}
+    known = [noise for noise in weight if noise.key in score]
     out = dict(weight)
     for _, noise in beside:
-        if noise.kinds not in kinds and known:
-            like = min(known, key=lambda one: (len(one.kinds ^ noise.kinds), -score[one.kinds]))
-            out[noise] = weight[like] * float(np.exp(score[noise.kinds] - score[like.kinds]))
+        if noise.key not in kinds and known:
+            like = min(known, key=lambda one: (len(one.key ^ noise.key), -score[one.key]))
+            out[noise] = weight[like] * float(np.exp(score[noise.key] - score[like.key]))
     total = sum(out.values())
     return tuple(sorted(((noise, w / total) for noise, w in out.items()), key=lambda one: -one[1]))
 
@@ -345,7 +358,7 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max((climb(white, one, of_two=board.wander is None) for one in starts), key=lambda found: found[0])
+    best, members = max((climb(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0])
     for _ in range(_ROUNDS):
         if members in asked:
             break

@@ -80,6 +80,24 @@ class Prior:
     drift: Ints
     twin: Ints
 
+    def of(self, places: Ints) -> Prior:
+        """Prior of some of the candidates, as unlikely as they are among all of them.
+
+        Parameters
+        ----------
+        places : ndarray of int, shape (k,)
+        """
+        return Prior(
+            self.log_share[places],
+            self.cause[places],
+            self.parameter[places],
+            self.repeats[places],
+            self.positive[places],
+            self.own[places],
+            self.drift[places],
+            self.twin[places],
+        )
+
     @cached_property
     def _bins(self) -> int:
         """Number of axes whose drifts are counted, and one for all that is no drift."""

@@ -1,0 +1,140 @@
+"""What one recording says in each noise that it may have: white, or with a memory of any kind that is probable.
+
+Noise that a recording learns by itself may be what an effect leaves, and an effect that it shows may be noise; the
+other recordings of the set tell. So a search in a set weighs the noises of every recording beside the effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.evidence.information import solved
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.noise_root import folded
+from sdimu_calibration.core.evidence.stretch_length import wander_in
+from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.board import Board, same_noise
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.posterior import noises_of
+
+_MOST = 12
+"""Number of noises of a recording at most, those beside its best effects first: each costs a matrix of all candidates,
+and the others weigh less than a hundredth."""
+
+
+@dataclass(frozen=True)
+class InOneNoise:
+    """What a recording says in one noise.
+
+    The log likelihood is ``-1/2 log_det - 1/2 (squares - explained - 2 d' theta + theta' J theta)``.
+
+    Attributes
+    ----------
+    names : tuple of str, length m
+        Coefficients and candidates.
+    columns : ndarray of int, shape (m,)
+        Column of J and d of each name; two names may have one.
+    J : ndarray, shape (k, k)
+        Inverse squares of the units (SI).
+    d : ndarray, shape (k,)
+        With all parameters at zero.
+    explained, log_det : float
+        Share of the sum of squares that the noise takes with all parameters at zero, and log of its determinant (1);
+        up to what all noises of the recording have in common.
+    squares : float
+        Sum of squares in white noise (1).
+    rows : int
+        Number of measurements.
+    """
+
+    noise: NoiseModel
+    names: tuple[str, ...]
+    columns: Ints
+    J: Floats
+    d: Floats
+    explained: float
+    log_det: float
+    squares: float
+    rows: int
+
+    def places(self, place: Mapping[str, int]) -> tuple[Ints, Ints]:
+        """Places of parameters that are wanted of it, and the columns of J and d that hold them.
+
+        Parameters
+        ----------
+        place : mapping of str to int
+            Where each parameter that is wanted stands.
+
+        Returns
+        -------
+        at, columns : ndarray of int, shape (w,)
+        """
+        have = [k for k, name in enumerate(self.names) if name in place]
+        return np.array([place[self.names[k]] for k in have], dtype=np.int64), self.columns[have]
+
+
+def in_its_noise(reduction: Reduction) -> InOneNoise:
+    """Give what a recording says in the noise in which it was reduced."""
+    A, y = reduction.A, reduction.y
+    names = (*reduction.names, *reduction.labels)
+    squares = float(y @ y) + reduction.unexplained
+    return InOneNoise(NoiseModel(), names, np.arange(len(names)), A.T @ A, A.T @ y, 0.0, 0.0, squares, reduction.rows)
+
+
+def rival_noises(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> tuple[InOneNoise, ...]:
+    """Work out the noises that a recording leaves probable, and what it says in each.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise, with the candidates of the set.
+    terms : sequence of NoiseTerm
+        Noise of its fit: sets the length of the stretches.
+    """
+    wander = wander_in(evidence, terms)
+    evidence = evidence.in_inner(wander.inner)
+    board = Board(evidence, np.arange(len(evidence.weight), len(evidence.names)), frozenset(), wander)
+    noises = [NoiseModel()]
+    for noise in noises_of(board):
+        if len(noises) < _MOST and not any(same_noise(noise, other) for other in noises):
+            noises.append(noise)
+    joint = board.joint or Joint.of(evidence, wander)
+    return tuple(_in_one(joint, noise) for noise in noises)
+
+
+def _in_one(joint: Joint, noise: NoiseModel) -> InOneNoise:
+    evidence, own = joint.evidence, len(joint.evidence.weight)
+    kept, others = kept_and_others(evidence)
+    order = np.concatenate([kept, np.arange(own, len(evidence.names))])
+    log_det, explained = _taken(joint, noise)
+    full = joint.in_noise(noise.terms) if noise.terms else evidence.information
+    J, d = full.J[np.ix_(order, order)], full.d[order].copy()
+    d[: len(kept)] -= evidence.weight[kept] * evidence.shift[kept]
+    if len(others):
+        A, B = full.J[np.ix_(others, others)] + np.diag(evidence.weight[others]), full.J[np.ix_(order, others)]
+        X = solved(A, np.column_stack([B.T, full.d[others]]))
+        J, d = J - B @ X[:, :-1], d - B @ X[:, -1]
+        explained += float(full.d[others] @ X[:, -1])
+        log_det += float(np.linalg.slogdet(A)[1])
+    # From the calibration to all parameters at zero.
+    point = np.zeros(len(order))
+    point[: len(kept)] = -evidence.shift[kept]
+    explained -= float(2.0 * d @ point + point @ J @ point)
+    names = tuple(evidence.names[k] for k in order)
+    squares, rows = float(evidence.e @ evidence.e), len(evidence.e)
+    return InOneNoise(noise, names, np.arange(len(names)), J, d + J @ point, explained, log_det, squares, rows)
+
+
+def _taken(joint: Joint, noise: NoiseModel) -> tuple[float, float]:
+    """Log determinant of a noise over white noise, and the sum of squares that it takes at the calibration (1)."""
+    if not noise.terms:
+        return 0.0, 0.0
+    q, full = len(joint.evidence.names), joint.information
+    M, y, _ = folded(full.J[q:, q:], full.d[q:], noise.terms, joint.wander.cut)
+    return float(np.linalg.slogdet(M)[1]), float(y @ np.linalg.solve(M, y))

@@ -1,0 +1,292 @@
+"""The board of a set: its candidates in any noise of each recording, and the noises beside any choice of them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.evidence.information import Information
+from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
+from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.board import Board, InNoise
+from sdimu_calibration.core.posterior.models import Members, gains
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.prior import Prior, prior_of, twins
+
+_NEAR = 6.0
+"""Log posterior (1) behind the best noises up to which others are kept: effects beside them may change that much."""
+_HOPELESS = 10.0
+"""Log posterior (1) behind nothing from which a candidate of one recording is left out: a window holds what is within 7
+of the best model, and all that is left out weighs a hundredth together."""
+_SWEEPS = 4
+"""Number of times that the noise of each recording is chosen in turn: they hang on each other by the coefficients
+alone, which each recording knows well."""
+
+
+@dataclass(frozen=True)
+class SetNoise(NoiseModel):
+    """Noise of a set: that of each recording.
+
+    Attributes
+    ----------
+    chosen : tuple of int
+        Place of each among the noises of its recording.
+    own : tuple of NoiseModel
+        Of each recording, in the order of the reports.
+    """
+
+    chosen: tuple[int, ...] = ()
+    own: tuple[NoiseModel, ...] = ()
+
+    @property
+    def sizes(self) -> Mapping[Hashable, float]:
+        """Size of each term (SI), by its recording and what it is."""
+        return {(k, t.identity): t.size for k, noise in enumerate(self.own) for t in noise.terms}
+
+
+@dataclass(frozen=True)
+class _Share:
+    """What some recordings say in their noises; attributes as of `InOneNoise`, the parameters those of the set."""
+
+    J: Floats
+    d: Floats
+    explained: float
+    log_det: float
+
+
+class SetBoard(Board[SetEvidence]):
+    """Evidence of a set in any noise of each recording, and what may be in a model.
+
+    White noise in all recordings is `NoiseModel()`. What differs from power-on to power-on scatters as in the fit.
+
+    Parameters
+    ----------
+    fit : SetFit
+        Its reports have all columns of the evidence.
+    told : mapping of str to str
+        Names that the fit has for the first candidates of the evidence, which an earlier search told, by their labels.
+    evidence, allowed, finer, wander, earlier : object
+        As of `Board`; the noises are those of the reports.
+    """
+
+    def __init__(
+        self,
+        fit: SetFit,
+        told: Mapping[str, str],
+        evidence: SetEvidence,
+        allowed: Ints,
+        finer: frozenset[int],
+        wander: Wander | None,
+        earlier: Joint | None = None,
+    ) -> None:
+        super().__init__(evidence, allowed, finer, wander, earlier)
+        self.rivals = tuple(r.rivals or (in_its_noise(r.reduction),) for r in fit.reports)
+        names = [power_on(r) for r in fit.reports]
+        self._groups = [[k for k, name in enumerate(names) if name == one] for one in fit.power_ons]
+        self._names = tuple(told.get(name, name) for name in evidence.names)
+        column = {name: k for k, name in enumerate(self._names)}
+        self._own = [(column[fit.names[own]], column[fit.names[shared]]) for own, shared in own_values(fit.names)]
+        components = columns_of(fit.varying, fit.names) if fit.turn_on else []
+        self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
+        self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
+        self._white = (0,) * len(self.rivals)
+        self._told = len(evidence.weight) + np.arange(len(told))
+
+    @property
+    def has_noises(self) -> bool:
+        """Whether noise with a memory may be in a model."""
+        return any(len(own) > 1 for own in self.rivals)
+
+    @cached_property
+    def use(self) -> Ints:
+        """Columns of the evidence that may weigh in a model, in the order of the candidates of `data`.
+
+        Of what may be in one recording alone, thousands, most are far behind in any noise, beside nothing as well as
+        beside what was told.
+
+        Returns
+        -------
+        ndarray of int, shape (u,)
+        """
+        return self.testable[self._hopeful]
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Prior of the candidates at `use`: as unlikely as they are among all that are testable."""
+        J = self.evidence.information.given(self.evidence.model, self.evidence.weight).J[np.ix_(self.use, self.use)]
+        return replace(self._prior_of_all.of(np.flatnonzero(self._hopeful)), twin=twins(J))
+
+    @cached_property
+    def _prior_of_all(self) -> Prior:
+        first = len(self.evidence.weight)
+        at = self.testable.tolist()
+        return prior_of(
+            [self.evidence.candidates[k - first] for k in at], [i for i, k in enumerate(at) if k in self.finer]
+        )
+
+    @cached_property
+    def _hopeful(self) -> Bools:
+        """Tell the testable candidates that may weigh in a model; shape of `testable`."""
+        evidence, columns = self.evidence, self.testable
+        first, odds = len(evidence.weight), self._prior_of_all.log_more([])
+        recording = np.array([evidence.candidates[k - first].recording for k in columns.tolist()])
+        size, none = self.sizes_of(columns), np.zeros(0)
+        keep: Bools = (recording == "") | np.isin(columns, self._told)
+        for known, free in ((evidence.model, none), (np.append(evidence.model, self._told), np.zeros(len(self._told)))):
+            weight = np.concatenate([evidence.weight, free])
+            for chosen in {self._white, self._likeliest(known, weight)}:
+                for name in np.unique(recording[~keep]):
+                    at = np.flatnonzero((recording == name) & ~keep)
+                    one = self._total(chosen, np.concatenate([known, columns[at]]))
+                    one.d[:first] += evidence.weight * evidence.shift
+                    J, d = Information(one.J, one.d).diagonal_given(np.arange(len(known)), weight)
+                    c, r = np.maximum(J[len(known) :], 0.0) * size[at] ** 2, d[len(known) :] * size[at]
+                    gain = gains(c, r, np.zeros(len(c), dtype=bool)).max(axis=1) + odds[at]
+                    keep[at[gain > -_HOPELESS]] = True
+        return keep
+
+    def _likeliest(self, columns: Ints, weight: Floats) -> tuple[int, ...]:
+        """Choose the noise of each recording in turn until all stand, with some parameters in the model."""
+        return max(self._tried(columns, weight).items(), key=lambda one: one[1])[0]
+
+    def _tried(self, columns: Ints, weight: Floats) -> dict[tuple[int, ...], float]:
+        """Log posterior (1) of the noises that were tried until that of each recording stood, over white noise."""
+        white = self._likelihood(self._white, columns, weight)
+        found: dict[tuple[int, ...], float] = {}
+
+        def score(chosen: tuple[int, ...]) -> float:
+            if chosen not in found:
+                found[chosen] = self._likelihood(chosen, columns, weight) - white + self._noise(chosen).log_prior
+            return found[chosen]
+
+        best = self._white
+        for _ in range(_SWEEPS):
+            before = best
+            for k, own in enumerate(self.rivals):
+                best = max((_changed(best, k, other) for other in range(len(own))), key=score)
+            if best == before:
+                break
+        return found
+
+    def squares(self, noise: NoiseModel) -> tuple[float, int]:
+        """Sum of the squared residuals with no effect added, in a noise (1), and their number."""
+        return (
+            sum(own[0].squares for own in self.rivals)
+            - self._total(self._chosen(noise), self.evidence.model).explained,
+            sum(own[0].rows for own in self.rivals),
+        )
+
+    def worked_out(self, noise: NoiseModel) -> InNoise:
+        """Work out the information in a noise as its model states it."""
+        evidence, one = self.evidence, self._total(self._chosen(noise), self.keep)
+        one.d[: len(evidence.weight)] += evidence.weight * evidence.shift
+        none = np.zeros((0, 0))
+        return InNoise(one.J, one.d, none, np.zeros((0, len(one.d))), np.zeros(0), none)
+
+    def likelihood(self, noise: NoiseModel) -> float:
+        """Log likelihood (1) of no effect in a noise, over that in white noise."""
+        columns, weight = self.parameters(())
+        return self._likelihood(self._chosen(noise), columns, weight) - self._likelihood(self._white, columns, weight)
+
+    def noises(
+        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf
+    ) -> list[tuple[float, NoiseModel]]:
+        """Noises that are probable beside a set of effects, each with the log posterior of both (1).
+
+        That of each recording is chosen in turn until all stand; others are one change away from these.
+        """
+        del tried, rival
+        alone = self.data(NoiseModel())[1].at(members).of_any_sign
+        found = self._tried(*self.parameters(members))
+        ranked = sorted(found.items(), key=lambda one: -one[1])
+        return [(alone + gain, self._noise(chosen)) for chosen, gain in ranked if gain > ranked[0][1] - _NEAR]
+
+    def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
+        own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=True))
+        terms = tuple(t for noise in own for t in noise.terms)
+        return SetNoise(terms, sum(noise.log_prior for noise in own), chosen, own)
+
+    def _chosen(self, noise: NoiseModel) -> tuple[int, ...]:
+        return noise.chosen if isinstance(noise, SetNoise) else self._white
+
+    def _likelihood(self, chosen: tuple[int, ...], columns: Ints, weight: Floats) -> float:
+        """Log likelihood (1) of some parameters in a noise, up to what is common to all noises."""
+        evidence, one = self.evidence, self._total(chosen, columns)
+        A, d = one.J + np.diag(weight), one.d
+        d[: len(evidence.weight)] += evidence.weight * evidence.shift
+        scale = 1.0 / np.sqrt(np.diag(A))
+        L = np.linalg.cholesky(A * np.outer(scale, scale))
+        z = np.linalg.solve(L, d * scale)
+        log_det = one.log_det + 2.0 * float(np.sum(np.log(np.diag(L)) - np.log(scale)))
+        return 0.5 * (one.explained + float(z @ z) - log_det)
+
+    def _total(self, chosen: tuple[int, ...], columns: Ints) -> _Share:
+        """Put together what all recordings say of the model's parameters and more columns, about the estimate."""
+        # What is eliminated, and what stands for two parameters, is needed besides.
+        more = [*self._varying.tolist(), *chain.from_iterable(self._own)]
+        every = np.concatenate([columns, np.setdiff1d(more, columns)]).astype(np.int64)
+        place = {self._names[column]: k for k, column in enumerate(every.tolist())}
+        J, d = np.zeros((len(every), len(every))), np.zeros(len(every))
+        explained = log_det = 0.0
+        for group in self._groups:
+            at, one = self._of_power_on([self.rivals[k][chosen[k]] for k in group], place)
+            J[np.ix_(at, at)] += one.J
+            d[at] += one.d
+            explained, log_det = explained + one.explained, log_det + one.log_det
+        return self._about(_Share(J, d, explained, log_det), place, len(columns))
+
+    def _of_power_on(self, recordings: Sequence[InOneNoise], place: Mapping[str, int]) -> tuple[Ints, _Share]:
+        """Put together what the recordings of one power-on say of parameters.
+
+        Returns
+        -------
+        at : ndarray of int, shape (w,)
+            Places of those that these recordings know: of the thousands of a set a few hundred.
+        share : _Share
+            On them; what the power-on may differ by is eliminated.
+        """
+        parts = [one.places(place) for one in recordings]
+        at = np.unique(np.concatenate([wanted for wanted, _ in parts]))
+        J, d = np.zeros((len(at), len(at))), np.zeros(len(at))
+        for one, (wanted, own) in zip(recordings, parts, strict=True):
+            here = np.searchsorted(at, wanted)
+            J[np.ix_(here, here)] += one.J[np.ix_(own, own)]
+            d[here] += one.d[own]
+        explained, log_det = sum(one.explained for one in recordings), sum(one.log_det for one in recordings)
+        varying = np.array([place[self._names[column]] for column in self._varying.tolist()], dtype=np.int64)
+        # A recording that has a value of its own does not know that of the others.
+        known = np.isin(varying, at)
+        v, tau = np.searchsorted(at, varying[known]), self._tau[known]
+        if not len(v):
+            return at, _Share(J, d, explained, log_det)
+        B, y = tau[:, None] * J[v], tau * d[v]
+        M = np.eye(len(v)) + B[:, v] * tau
+        X = np.linalg.solve(M, np.column_stack([B, y]))
+        explained, log_det = explained + float(y @ X[:, -1]), log_det + float(np.linalg.slogdet(M)[1])
+        return at, _Share(J - B.T @ X[:, :-1], d - B.T @ X[:, -1], explained, log_det)
+
+    def _about(self, one: _Share, place: Mapping[str, int], count: int) -> _Share:
+        """Take the first parameters alone, about the estimate of the set, in the coordinates of its evidence."""
+        J, d = one.J, one.d
+        names = self._names
+        for own, shared in ((place[names[own]], place[names[shared]]) for own, shared in self._own):
+            J[shared] += J[own]
+            J[:, shared] += J[:, own]
+            d[shared] += d[own]
+        J, d, point = J[:count, :count], d[:count], np.zeros(count)
+        point[: len(self.evidence.weight)] = -self.evidence.shift
+        moved = J @ point
+        return _Share(J, d - moved, one.explained + float(2.0 * d @ point - point @ moved), one.log_det)
+
+
+def _changed(chosen: tuple[int, ...], place: int, other: int) -> tuple[int, ...]:
+    return (*chosen[:place], other, *chosen[place + 1 :])

@@ -1,0 +1,88 @@
+"""A set in any noise of each recording: the same numbers as the evidence of the set, and as one recording alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.joint.rival_noises import rival_noises
+from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
+from sdimu_calibration.core.joint.set_evidence import set_evidence
+from sdimu_calibration.core.joint.set_fit import asked_again, fit_set, with_reports
+from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.storage.files.config import load_model
+
+from .conftest import here, short, unit_set
+
+RAMP = "gyro_bias_ramp_x"
+WALK = ("gyro_noise_random_walk=0.3 deg/h/sqrt(h)",)
+
+
+def log_likelihood(one, weight, p):
+    """Log likelihood of the coefficients in one noise, all other parameters left out."""
+    A = one.J[:p, :p] + np.diag(weight)
+    scale = 1.0 / np.sqrt(np.diag(A))
+    A = A * np.outer(scale, scale)
+    d = one.d[:p] * scale
+    log_det = one.log_det + np.linalg.slogdet(A)[1] - 2.0 * np.sum(np.log(scale))
+    return 0.5 * (one.explained + d @ np.linalg.solve(A, d) - log_det)
+
+
+def test_noises_of_one_recording_are_as_likely_as_its_own_board_says():
+    test = unit_set(35, [short()], noise=WALK).members[0].open()
+    fit = solve(test, load_model("baseline"))
+    evidence = fit.evidence([resolve(RAMP)])
+    rivals = rival_noises(evidence, fit.noise_terms)
+    board = Board(evidence, np.empty(0, dtype=np.int64), frozenset(), Wander.of(evidence))
+    p = evidence.coefficients
+    white = log_likelihood(rivals[0], evidence.weight[:p], p)
+    assert rivals[0].noise == NoiseModel()
+    assert any(one.noise.terms for one in rivals)
+    for one in rivals:
+        # The prior of what the recording has for itself is common to all noises.
+        assert log_likelihood(one, evidence.weight[:p], p) - white == pytest.approx(
+            board.likelihood(one.noise), rel=1e-4, abs=1e-2
+        )
+
+
+@pytest.fixture(scope="module")
+def full(options):
+    """A fit of three recordings whose reports have the signature of a candidate, and their noises."""
+    fit = fit_set(unit_set(35, [short()] * 3, noise=WALK).members, options, here)
+    return with_reports(fit, asked_again(fit, here, candidates=(RAMP,), rivals=True))
+
+
+def board_of(fit):
+    evidence = set_evidence(fit, split(resolve(RAMP)))
+    return SetBoard(fit, {}, evidence, np.array([len(evidence.weight)]), frozenset(), None)
+
+
+def test_in_the_noise_of_the_reports_it_is_the_evidence_of_the_set(full):
+    board = board_of(replace(full, reports=tuple(replace(r, rivals=()) for r in full.reports)))
+    own, whole, keep = board.worked_out(NoiseModel()), board.evidence.information, board.keep
+    unit = 1.0 / np.sqrt(np.diag(whole.J)[keep])
+    np.testing.assert_allclose(
+        own.J * np.outer(unit, unit), whole.J[np.ix_(keep, keep)] * np.outer(unit, unit), atol=1e-9
+    )
+    np.testing.assert_allclose(own.d * unit, whole.d[keep] * unit, atol=1e-7)
+    assert not board.has_noises
+
+
+def test_the_noise_of_each_recording_is_chosen_beside_those_of_the_others(full):
+    board = board_of(full)
+    ranked = board.noises(())
+    score, best = ranked[0]
+    assert isinstance(best, SetNoise)
+    assert "gyro" in {t.triad for t in best.terms}
+    assert len(best.own) == len(full.reports)
+    offset, data = board.data(best)
+    assert score == pytest.approx(offset + data.at(()).score)
+    assert score > board.data(NoiseModel())[0] + 20.0
+    assert all(score >= other for other, _ in ranked)
