@@ -32,7 +32,7 @@ from sdimu_calibration.core.diagnosis.search import search
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, heat_map
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Job, Picture, WorkerRequest
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Picture, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
@@ -66,22 +66,22 @@ def raw() -> RawTest:
 
 
 @pytest.fixture(scope="module")
-def job(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Job]:
+def setup(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[WorkerSetup]:
     journal = Journal(tmp_path_factory.mktemp("node") / "journal", digest("options"))
     for entry in zip(*raw.status, strict=True):
         journal.status(*map(int, entry))
     journal.samples(raw.ns, raw.omega_ib_b, raw.f_ib_b)
-    yield Job(journal.place, OPTIONS, "baseline")
+    yield WorkerSetup(journal.place, OPTIONS, "baseline")
     journal.close()
 
 
 @pytest.fixture(scope="module")
-def whole(job: Job) -> LiveDiagnosis:
-    return Diagnoser(job).answer(WorkerRequest(5, None)).diagnosis
+def whole(setup: WorkerSetup) -> LiveDiagnosis:
+    return Diagnoser(setup).answer(WorkerRequest(5, None)).diagnosis
 
 
-def test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted(job, tmp_path):
-    wanted = replace(job, report=tmp_path)
+def test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted(setup, tmp_path):
+    wanted = replace(setup, report=tmp_path)
     assert Diagnoser(wanted).answer(WorkerRequest(5, None, report=True)).unreported == ""
     found = json.loads((tmp_path / "diagnosis.json").read_text())
     assert any(candidate["label"] == EFFECT for candidate in found["candidates"]), found["sentence"]
@@ -162,11 +162,11 @@ def test_shell_notebook_workbench_and_the_live_end_tell_the_same_probabilities(w
         assert float(live[f"{family['family']} {family['sensor']}".strip()]) == family["p"]
 
 
-def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
+def test_what_is_missing_stands_out_and_leaves_when_it_is_added(setup, whole):
     assert whole.verdict in {"one effect", "class of effects"}
     assert named(EFFECT) in whole.sentence
     assert EFFECT in {r.label for r in whole.standing}
-    added = Diagnoser(job).answer(WorkerRequest(5, None, ((), (EFFECT,)))).diagnosis
+    added = Diagnoser(setup).answer(WorkerRequest(5, None, ((), (EFFECT,)))).diagnosis
     assert added.verdict == "consistent"
     assert [rung.added for rung in added.ladder] == [(), (EFFECT,)]
     # One is of evidence with every candidate, the other of evidence with none: other shapes round otherwise.
@@ -176,7 +176,7 @@ def test_what_is_missing_stands_out_and_leaves_when_it_is_added(job, whole):
     assert added.ladder[1].held_out < added.ladder[0].held_out
 
 
-def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, job, tmp_path):
+def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, setup, tmp_path):
     """Whatever is in the journal behind it."""
     end = stop_end(raw, 2)
     short = until(raw, end)
@@ -184,14 +184,14 @@ def test_a_stop_is_diagnosed_by_what_had_come_by_its_end(raw, job, tmp_path):
     for entry in zip(*short.status, strict=True):
         journal.status(*map(int, entry))
     journal.samples(short.ns, short.omega_ib_b, short.f_ib_b)
-    alone = Diagnoser(replace(job, journal=journal.place)).answer(WorkerRequest(2, end)).diagnosis
-    assert Diagnoser(job).answer(WorkerRequest(2, end)).diagnosis == alone
+    alone = Diagnoser(replace(setup, journal=journal.place)).answer(WorkerRequest(2, end)).diagnosis
+    assert Diagnoser(setup).answer(WorkerRequest(2, end)).diagnosis == alone
     assert alone.stop == 2
     assert {place.stop for place in alone.where} == {0, 1, 2}
 
 
-def test_a_stop_that_cannot_be_fitted_says_what_it_waits_for(job):
-    answer = Diagnoser(job).answer(WorkerRequest(0, START + 10**9))
+def test_a_stop_that_cannot_be_fitted_says_what_it_waits_for(setup):
+    answer = Diagnoser(setup).answer(WorkerRequest(0, START + 10**9))
     assert answer.diagnosis.verdict == "waiting"
     assert "too few samples" in answer.diagnosis.sentence
 
@@ -220,8 +220,8 @@ def wait_for(worker: Worker) -> tuple[list[Answer], list[Picture]]:
     return [a for a in came if isinstance(a, Answer)], [p for p in came if isinstance(p, Picture)]
 
 
-def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole, question):
-    worker = Worker(replace(job, question=question))
+def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, setup, whole, question):
+    worker = Worker(replace(setup, question=question))
     try:
         for stop in (1, 2, 3, 4):
             worker.ask(WorkerRequest(stop, stop_end(raw, stop), about=f"stop {stop}"))
@@ -237,8 +237,8 @@ def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, job, whole,
     assert answers[1].more == ("the end", "filter", whole.ranking[0].label)
 
 
-def test_a_worker_that_has_ended_is_told_once(job):
-    worker = Worker(job)
+def test_a_worker_that_has_ended_is_told_once(setup):
+    worker = Worker(setup)
     worker._process.kill()
     worker._process.wait()
     worker.ask(WorkerRequest(1, None))
@@ -248,14 +248,14 @@ def test_a_worker_that_has_ended_is_told_once(job):
     worker.close()
 
 
-def test_a_worker_ends_with_its_node(job):
-    worker = Worker(job)
+def test_a_worker_ends_with_its_node(setup):
+    worker = Worker(setup)
     worker._pipe.close()  # as the system does when the node is killed
     assert worker._process.wait(PATIENCE_S) == 0
 
 
-def test_a_folder_is_no_journal(job, tmp_path):
-    answer = Diagnoser(replace(job, journal=Path(tmp_path))).answer(WorkerRequest(0, None))
+def test_a_folder_is_no_journal(setup, tmp_path):
+    answer = Diagnoser(replace(setup, journal=Path(tmp_path))).answer(WorkerRequest(0, None))
     assert answer.diagnosis.verdict == "waiting"
     assert "cannot be read" in answer.diagnosis.sentence
 

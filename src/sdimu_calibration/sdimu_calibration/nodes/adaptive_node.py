@@ -22,13 +22,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S, Menu
-from sdimu_calibration.core.adaptive.question import Asked, Decision, next_move
+from sdimu_calibration.core.adaptive.question import Decision, Situation, next_move
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
 from sdimu_calibration.nodes.calibration_node import JOURNAL
 from sdimu_calibration.nodes.credits import HISTORY, NS, header
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, WorkerRequest
+from sdimu_calibration.nodes.diagnosis_worker import Answer, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.driving import PATIENCE_S, Driving
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.nodes.opening_parameters import declare_opening
@@ -64,7 +64,7 @@ class AdaptiveNode:
         if aside := put_aside(self._out / CHOICES):
             self.node.get_logger().warning(f"{self._out / CHOICES}: of an earlier test; kept as {aside}")
         self._goals, self._models, self._menu = goals, (added,), Menu()
-        self._worker = Worker(Job(self._out / JOURNAL, options, model, next_move, pictures=False))
+        self._worker = Worker(WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False))
         self._driving = Driving(self.node, self._act)
         self.done = self._driving.done
         self._choices = self.node.create_publisher(DiagnosticArray, "~/choice", HISTORY)
@@ -111,7 +111,7 @@ class AdaptiveNode:
         if not isinstance(answer, Answer):
             if self._worker.idle and time.monotonic() > self._look_at:
                 spent_s = (self._end_ns - self._begin_ns) / NS
-                about = Asked(self._goals, self._menu, self._driving.table, angles, spent_s)
+                about = Situation(self._goals, self._menu, self._driving.table, angles, spent_s)
                 # The worker keeps what it has read up to a stamp: another stamp lets it read the journal again.
                 self._worker.ask(WorkerRequest(self._stop, self._end_ns + self._tries, self._models, about))
                 self._tries += 1

@@ -46,7 +46,7 @@ from sdimu_calibration.core.specification import Model
 from sdimu_calibration.nodes import calibration_messages as messages
 from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish
 from sdimu_calibration.nodes.diagnosing import Diagnosing
-from sdimu_calibration.nodes.diagnosis_worker import Job
+from sdimu_calibration.nodes.diagnosis_worker import WorkerSetup
 from sdimu_calibration.nodes.feed import Feed
 from sdimu_calibration.nodes.heartbeat import Heartbeat
 from sdimu_calibration.nodes.listening import Listener
@@ -130,8 +130,8 @@ class CalibrationNode:
         report = declare.flag("report", False, "with diagnose: leave diagnosis.json and report.html at the end")
         self._patience_s = REPORT_S if report else DIAGNOSIS_S
         place = self._out if report else None
-        job = Job(self._journal.place, self._options, model, report=place) if diagnose else None
-        self._diagnosing = Diagnosing(node, job, added, self._warn)
+        setup = WorkerSetup(self._journal.place, self._options, model, report=place) if diagnose else None
+        self._diagnosing = Diagnosing(node, setup, added, self._warn)
         node.add_on_set_parameters_callback(self._check_added)
         node.add_post_set_parameters_callback(self._take_added)
         if resumed:

@@ -18,7 +18,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, WorkerRequest
+from sdimu_calibration.nodes.diagnosis_worker import Answer, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.nodes.live_report import DIAGNOSIS, REPORT
 from sdimu_calibration.report.live_text import diagnosis_line
@@ -29,7 +29,7 @@ class Diagnosing:
 
     Parameters
     ----------
-    job : Job or None
+    setup : WorkerSetup or None
         None where nothing is to be diagnosed.
     added : tuple of str
         Effects beyond the model that the test begins with.
@@ -37,10 +37,12 @@ class Diagnosing:
         Tells the user that there will be no more diagnoses, and why.
     """
 
-    def __init__(self, node: Node, job: Job | None, added: tuple[str, ...], warn: Callable[[str], None]) -> None:
+    def __init__(
+        self, node: Node, setup: WorkerSetup | None, added: tuple[str, ...], warn: Callable[[str], None]
+    ) -> None:
         self._node, self._warn = node, warn
-        self._worker = Worker(job) if job else None
-        self._report = job.report if job else None
+        self._worker = Worker(setup) if setup else None
+        self._report = setup.report if setup else None
         self._models = [added]
         self._stop, self._rest_ns = 0, 0
         self._last: tuple[int, int | None] | None = None
@@ -69,7 +71,7 @@ class Diagnosing:
         self._ask(self._stop, None, report=True)
 
     def report(self) -> None:
-        """Ask for the files of what there is, where the job wants any; the result.json that they are of is written."""
+        """Ask for the files of what there is, where the setup names a folder; result.json stands already."""
         if self._report is not None:
             self.end()
 

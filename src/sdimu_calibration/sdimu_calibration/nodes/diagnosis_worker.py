@@ -28,14 +28,14 @@ from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import read_journal
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
-"""A further question of a fit: `Job.question`."""
+"""A further question of a fit: `WorkerSetup.question`."""
 _NICE = 10
 """Steps by which samples come first."""
 
 
 @dataclass(frozen=True)
-class Job:
-    """What holds for all requests.
+class WorkerSetup:
+    """What holds for all requests to a worker.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class WorkerRequest:
     about : object
         For the question.
     report : bool
-        Leave the files of `Job.report`, too.
+        Leave the files of `WorkerSetup.report`, too.
     asked : float
         When (s of the monotonic clock, which all processes share).
     """
@@ -99,7 +99,7 @@ class Answer:
     reached_ns : int
         Stamp of the last sample that was looked at (ns); 0 where there was none.
     unreported : str
-        Why the files of `Job.report` are not there; empty where they are, or none are wanted.
+        Why the files of `WorkerSetup.report` are not there; empty where they are, or none are wanted.
     """
 
     request: WorkerRequest
@@ -133,8 +133,8 @@ def picture(answer: Answer) -> Picture:
 class Diagnoser:
     """Answers requests, and remembers the last data and the errors of models on them."""
 
-    def __init__(self, job: Job) -> None:
-        self._job = job
+    def __init__(self, setup: WorkerSetup) -> None:
+        self._setup = setup
         self._test: tuple[int | None, PreparedTest] | None = None
         self._reached_ns = 0
         self._errors: dict[tuple[str, ...], ModelError] = {}
@@ -145,10 +145,12 @@ class Diagnoser:
         try:
             test = self._opened(request.until_ns)
             earlier = [self._error(test, models) for models in request.models[:-1]]
-            found, fit = so_far(test, extended_model(self._job.model, added), added, earlier, request.until_ns is None)
+            found, fit = so_far(
+                test, extended_model(self._setup.model, added), added, earlier, request.until_ns is None
+            )
             self._errors[added] = found.ladder[-1]
-            if self._job.question is not None:
-                more = self._job.question(fit, found, request.about)
+            if self._setup.question is not None:
+                more = self._setup.question(fit, found, request.about)
             if request.report:
                 unreported = self._report(test, added)
         except DataError as error:
@@ -158,30 +160,30 @@ class Diagnoser:
 
     def _report(self, test: PreparedTest, added: tuple[str, ...]) -> str:
         """Leave the files of the whole test where they are wanted; why that was not possible."""
-        if self._job.report is None:
+        if self._setup.report is None:
             return ""
         try:
-            name = " + ".join((self._job.model, *added))
-            leave_report(self._job.report, test, extended_model(self._job.model, added), name)
+            name = " + ".join((self._setup.model, *added))
+            leave_report(self._setup.report, test, extended_model(self._setup.model, added), name)
         except (DataError, OSError) as error:
             return str(error)
         return ""
 
     def _error(self, test: PreparedTest, added: tuple[str, ...]) -> ModelError:
         if added not in self._errors:
-            self._errors[added] = error_of(test, extended_model(self._job.model, added), added)
+            self._errors[added] = error_of(test, extended_model(self._setup.model, added), added)
         return self._errors[added]
 
     def _opened(self, until_ns: int | None) -> PreparedTest:
         """Open the data up to a stamp, unless they are those of the last request; everything is read anew."""
         if self._test is None or until_ns is None or self._test[0] != until_ns:
             self._test, self._errors = None, {}
-            raw = read_journal(self._job.journal)
+            raw = read_journal(self._setup.journal)
             raw = raw if until_ns is None else until(raw, until_ns)
             self._reached_ns = int(raw.ns.max(initial=0))
             if len(raw.ns) <= NOMINAL_FROM:
                 raise DataError("too few samples have come")
-            opened = open_test(in_order(raw), self._job.options)
+            opened = open_test(in_order(raw), self._setup.options)
             self._test = until_ns, PreparedTest(opened.recording, opened.imu, opened.site)
         return self._test[1]
 
@@ -192,19 +194,19 @@ def work(pipe: Connection) -> None:
     Parameters
     ----------
     pipe : Connection
-        Brings a `Job`, then each `WorkerRequest`; takes each `Answer`, and where the job wants it a `Picture`,
-        which need not be waited for.
+        Brings a `WorkerSetup`, then each `WorkerRequest`; takes each `Answer`, and where the setup wants it a
+        `Picture`, which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
     try:
-        job = pipe.recv()
-        diagnoser = Diagnoser(job)
+        setup = pipe.recv()
+        diagnoser = Diagnoser(setup)
         while True:
             answer = diagnoser.answer(pipe.recv())
             pipe.send(answer)
-            if job.pictures:
+            if setup.pictures:
                 pipe.send(picture(answer))
     except (EOFError, OSError):
         # The node has left.

@@ -10,7 +10,7 @@ from dataclasses import replace
 from multiprocessing import Pipe
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.nodes.diagnosis_worker import Answer, Job, Picture, WorkerRequest
+from sdimu_calibration.nodes.diagnosis_worker import Answer, Picture, WorkerRequest, WorkerSetup
 
 _PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
 """Not ``-m``: what goes through the pipe is of the classes of a module by its real name."""
@@ -19,7 +19,7 @@ _PROGRAM = "from sdimu_calibration.nodes.diagnosis_worker import main; main()"
 class Worker:
     """A process that answers one request at a time; the newest one waits, those before it are forgotten."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, setup: WorkerSetup) -> None:
         self._pipe, far = Pipe()
         # A new interpreter, not a fork: the threads of DDS do not survive one.
         self._process = subprocess.Popen(
@@ -30,8 +30,8 @@ class Worker:
         )
         # The only other end is the worker's: it reads the end of the pipe when this process is gone.
         far.close()
-        self._pipe.send(job)
-        self._last = Picture if job.pictures else Answer
+        self._pipe.send(setup)
+        self._last = Picture if setup.pictures else Answer
         self._busy: WorkerRequest | None = None
         self._next: WorkerRequest | None = None
 
@@ -54,7 +54,7 @@ class Worker:
                 self._pipe.send(self._busy)
 
     def answer(self) -> Answer | Picture | None:
-        """Return what has come: an answer, then the picture of it where the job wants one."""
+        """Return what has come: an answer, then the picture of it where the setup wants one."""
         try:
             if self._busy is None or not self._pipe.poll():
                 return None

@@ -5,7 +5,7 @@ import pickle
 from dataclasses import replace
 
 from sdimu_calibration.core.adaptive import Goals, Menu, fitted, question
-from sdimu_calibration.core.adaptive.question import Asked, next_move
+from sdimu_calibration.core.adaptive.question import Situation, next_move
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_calibration.storage.files.table_file import load_rate_table
@@ -16,8 +16,8 @@ GOALS = load_goals("table33")
 TABLE = load_rate_table("ideal")
 
 
-def asked(goals: Goals, *angles: float) -> Asked:
-    return Asked(goals, Menu(), TABLE, angles or (0.0, 0.0, 0.0), 60.0)
+def asked(goals: Goals, *angles: float) -> Situation:
+    return Situation(goals, Menu(), TABLE, angles or (0.0, 0.0, 0.0), 60.0)
 
 
 def consistent(minutes: float) -> LiveDiagnosis:

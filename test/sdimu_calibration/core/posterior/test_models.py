@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from sdimu_calibration.core.posterior.models import Data
 from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, MOST_DRIFTS, WIDTH_SHARES, WIDTHS, Prior, twins
-from sdimu_calibration.core.posterior.search import WINDOW, climb, window
+from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
 
 ROWS = 40
 
@@ -111,9 +111,9 @@ def test_variants_of_a_parameter_exclude_each_other_unless_they_happen_at_one_ti
     W = drawn(4, rng, alike=0.0)
     e = 5.0 * (W[:, 0] + W[:, 1]) + rng.standard_normal(ROWS)
     same = np.array([0, 0, 1, 2])
-    _, members = climb(data_of(W, e, prior(4, parameter=same)), ())
+    _, members = best_from(data_of(W, e, prior(4, parameter=same)), ())
     assert len({k for k, _ in members} & {0, 1}) == 1
-    _, members = climb(data_of(W, e, prior(4, parameter=same, repeats=np.ones(4, dtype=bool))), ())
+    _, members = best_from(data_of(W, e, prior(4, parameter=same, repeats=np.ones(4, dtype=bool))), ())
     assert {0, 1} <= {k for k, _ in members}
 
 
@@ -121,7 +121,7 @@ def test_a_bias_has_four_drifts_at_most():
     rng = np.random.default_rng(7)
     W = drawn(7, rng, alike=0.0)
     data = data_of(W, 9.0 * W.sum(axis=1) + rng.standard_normal(ROWS), prior(7, drift=np.array([3] * 6 + [-1])))
-    members = climb(data, (), of_two=False)[1]
+    members = best_from(data, (), of_two=False)[1]
     assert len(members) == MOST_DRIFTS + 1
     assert 6 in {k for k, _ in members}
 
@@ -136,7 +136,7 @@ def test_a_pair_beside_three_drifts_of_a_bias_is_one_that_a_model_may_hold():
     score, members = here.paired()
     assert score == pytest.approx(data.at(members).score, abs=1e-9)
     assert len([k for k, _ in members if known.drift[k] == 2]) == MOST_DRIFTS
-    score, members = climb(data, ())
+    score, members = best_from(data, ())
     assert np.isfinite(score)
     assert score == pytest.approx(data.at(members).score, abs=1e-9)
 
@@ -145,8 +145,8 @@ def test_what_cannot_be_negative_is_not():
     rng = np.random.default_rng(5)
     W = drawn(3, rng, alike=0.0)
     e = -5.0 * W[:, 0] + rng.standard_normal(ROWS)
-    assert climb(data_of(W, e, prior(3)), ())[1]
-    assert not climb(data_of(W, e, prior(3, positive=np.ones(3, dtype=bool))), ())[1]
+    assert best_from(data_of(W, e, prior(3)), ())[1]
+    assert not best_from(data_of(W, e, prior(3, positive=np.ones(3, dtype=bool))), ())[1]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -160,7 +160,7 @@ def test_climb_and_window_find_what_a_look_at_all_models_finds(seed):
     for widths in itertools.product((None, 0, 1, 2), repeat=6):
         members = tuple((k, w) for k, w in enumerate(widths) if w is not None)
         every[members] = data.at(members).score
-    score, best = climb(data, ())
+    score, best = best_from(data, ())
     assert score == pytest.approx(max(every.values()), abs=1e-9)
     found = {members: s for (_, members), s in window([data], [0.0], [best]).items()}
     near = {members: s for members, s in every.items() if s > score - WINDOW}
@@ -185,7 +185,7 @@ def test_probabilities_come_true_where_the_world_is_as_the_prior_says():
                 break
         size = rng.choice(WIDTHS, q, p=WIDTH_SHARES) * rng.standard_normal(q)
         data = data_of(W, W[:, members] @ size[members] + rng.standard_normal(ROWS), known)
-        found = window([data], [0.0], [climb(data, ())[1]])
+        found = window([data], [0.0], [best_from(data, ())[1]])
         weight = np.exp(np.array(list(found.values())) - max(found.values()))
         for k in range(q):
             told.append(
@@ -209,7 +209,7 @@ def test_what_no_data_tell_apart_is_in_a_model_once():
     assert len(set(number.tolist())) == 5
     known = prior(6, twin=number)
     data = data_of(W, 6.0 * W[:, 1] / np.linalg.norm(W[:, 1]) + rng.standard_normal(ROWS), known)
-    found = {m for _, m in window([data], [0.0], [climb(data, ())[1]])}
+    found = {m for _, m in window([data], [0.0], [best_from(data, ())[1]])}
     held = [{k for k, _ in m} for m in found]
     assert any(1 in have for have in held)
     assert any(4 in have for have in held)

@@ -22,13 +22,17 @@ from sdimu_calibration.core.verdict import Verdict
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked of.
+class Situation:
+    """Where a running test stands, and what it may do next.
 
     Attributes
     ----------
+    goals : Goals
+        When the test may end.
+    menu : Menu
+        Moves that it may choose from.
     angles : tuple of float
-        Of its joints (rad).
+        Of the joints of the table (rad).
     elapsed_s : float
         Since the test began (s): what was recorded before does not count.
     """
@@ -72,7 +76,7 @@ class Decision:
     alike: tuple[str, ...]
 
 
-def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
+def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:
     """Choose the next move of a test.
 
     The search for effects is made when something stands out, and before the test ends.
@@ -96,6 +100,6 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Asked) -> Decision:
     return Decision(chosen.step, chosen.text, chosen.reason, False, *facts)
 
 
-def _choose(known: Knowledge, about: Asked, minutes_left: float) -> Choice | End:
+def _choose(known: Knowledge, about: Situation, minutes_left: float) -> Choice | End:
     possible = partial(is_possible, about.table, np.array(about.angles))
     return choose(known, about.goals, about.menu, minutes_left, possible)

@@ -21,7 +21,7 @@ from sdimu_calibration.core.posterior.combinations import combinations_of, cross
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.posterior.search import WINDOW, climb, window
+from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
 from sdimu_calibration.core.posterior.sharpening import hoped, sharpened
 
 PROBABLE = 0.5
@@ -358,7 +358,9 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max((climb(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0])
+    best, members = max(
+        (best_from(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0]
+    )
     for _ in range(_ROUNDS):
         if members in asked:
             break
@@ -376,14 +378,14 @@ def _climbed(
         known = []
         for _, noise, one in sorted(near, key=lambda found: -found[0])[:_NOISES]:
             offset, data = board.data(noise)
-            trials = [climb(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
+            trials = [best_from(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
             gain, found = max(trials, key=lambda t: t[0])
             if not np.isfinite(gain):  # none of these is a model in that noise
-                gain, found = climb(data, (), of_two=False)
+                gain, found = best_from(data, (), of_two=False)
             known.append((offset + gain, noise, found))
         known.sort(key=lambda found: -found[0])
         offset, data = board.data(known[0][1])
-        score, members = climb(data, known[0][2])
+        score, members = best_from(data, known[0][2])
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)
@@ -399,7 +401,7 @@ def _in_same_noise(
     found = []
     for place, noise in enumerate(noises[:_FEW]):
         offset, data = board.data(noise)
-        score, members = max((climb(data, one, of_two=False) for one in starts), key=lambda t: t[0])
+        score, members = max((best_from(data, one, of_two=False) for one in starts), key=lambda t: t[0])
         found.append((offset + score, -place, members))
     found.sort(reverse=True)
     order = [-place for _, place, _ in found]

@@ -33,8 +33,8 @@ _LEAST_GAIN = 1e-6
 """Log posterior (1) that a move must gain: less is rounding, and would go round in circles."""
 
 
-def climb(data: Data, start: Members, of_two: bool = True) -> tuple[float, Members]:
-    """Find the best model that moves lead to.
+def best_from(data: Data, start: Members, of_two: bool = True) -> tuple[float, Members]:
+    """Climb from a model to the best one that moves lead to.
 
     Parameters
     ----------
