@@ -20,7 +20,7 @@ from sdimu_calibration.storage.files.config import find_config, load_imu, load_p
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.model_choice import named_model
 from sdimu_calibration.storage.files.plan_file import write_plan
-from sdimu_calibration.storage.files.result_file import plain_origin, write_result
+from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.standing_file import KnownEntry, read_standing
 from sdimu_calibration.storage.opening import said_of, with_imu_file
 
@@ -139,4 +139,4 @@ def test_a_site_and_an_imu_of_the_users_own_are_found_again_from_the_results(els
 
 
 def test_names_in_config_leave_no_path_in_a_result(elsewhere):
-    assert "site_file" not in plain_origin(said_of(elsewhere / "bag", "daejeon"))
+    assert said_of(elsewhere / "bag", "daejeon").site_file == ""

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Final, Literal
 
-from sdimu_calibration.core.fleet.sheet import Line
+from sdimu_calibration.core.fleet import sheet
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.fleet_folder import Entry
-from sdimu_calibration.storage.files.json_file import entry, write_json
+from sdimu_calibration.storage.files.json_file import entry
+from sdimu_calibration.storage.files.result_model import Entry as DataclassEntry
+from sdimu_calibration.storage.files.result_model import Line, ResultModel
 
-FORMAT = "sdimu-datasheet/1"
+FORMAT: Final = "sdimu-datasheet/1"
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,35 @@ class Certificate:
     recordings: tuple[tuple[str, str], ...] = ()
 
 
-def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entries: Sequence[Entry]) -> None:
+class HashedFile(ResultModel):
+    """A file of a recording; its digest is empty where the file was not found."""
+
+    file: Line
+    sha256: Line
+
+
+class SheetResult(ResultModel):
+    """A result that the data sheet is made of."""
+
+    name: Line
+    unit: Line
+
+
+class DatasheetFile(ResultModel):
+    """datasheet.json, in the order of its keys: a `Certificate`, then what it vouches for."""
+
+    format: Literal["sdimu-datasheet/1"] = FORMAT
+    serial: Line = ""
+    date: Line = ""
+    operator: Line = ""
+    plan: Line = ""
+    version: Line = ""
+    recordings: tuple[HashedFile, ...] = ()
+    results: tuple[SheetResult, ...]
+    lines: tuple[Annotated[sheet.Line, DataclassEntry({"verdict": lambda line: line.verdict})], ...]
+
+
+def write_datasheet(path: Path, lines: Sequence[sheet.Line], about: Certificate, entries: Sequence[Entry]) -> None:
     """Write datasheet.json: SI numbers, ``null`` for what was not measured.
 
     Parameters
@@ -46,20 +76,13 @@ def write_datasheet(path: Path, lines: Sequence[Line], about: Certificate, entri
     entries : sequence of Entry
         The results that it is made of.
     """
-    write_json(
-        path,
-        {
-            "format": FORMAT,
-            **{key: value for key, value in asdict(about).items() if key != "recordings"},
-            "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
-            "results": [entry(one, "name unit") for one in entries],
-            "lines": [_line(line) for line in lines],
-        },
-    )
-
-
-def _line(line: Line) -> dict[str, Any]:
-    return asdict(line) | {"verdict": line.verdict}
+    DatasheetFile.model_construct(
+        format=FORMAT,
+        **entry(about, "serial date operator plan version"),
+        recordings=tuple(HashedFile.model_construct(file=name, sha256=digest) for name, digest in about.recordings),
+        results=tuple(SheetResult.model_construct(**entry(one, "name unit")) for one in entries),
+        lines=tuple(lines),
+    ).write(path)
 
 
 def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, str], ...]:

@@ -282,11 +282,6 @@ def as_note(line: str) -> str:
     return Note(found[1], None if found[2].startswith(":") else topic, found[2])
 
 
-def plain_origin(origin: Origin) -> dict[str, Any]:
-    """Give an origin as plain data; paths only where the user named one."""
-    return Entry(seldom=PATHS).plain(origin)
-
-
 def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, str]:
     """Find the noise that goes with a result: of the IMU file that is named, else of the calibration itself.
 
