@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-SRC = Path(__file__).resolve().parents[1] / "src"
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = (*(ROOT / "src").iterdir(), ROOT / "study")
+"""Packages that are read: those that users install, and the studies."""
 MOST_ARGUMENTS = 8
 DEEPEST = 4
 LONGEST = 60
@@ -24,7 +26,6 @@ MANY_ARGUMENTS: dict[Place, str] = {
     ("sdimu_calibration/core/data/resting_cycles.py", "_join"): "compiled",
     ("sdimu_calibration/core/filter/filter_pass.py", "_navigate_epoch"): "compiled",
     ("sdimu_calibration/core/navigation/track.py", "_seen"): "compiled",
-    ("sdimu_calibration/core/navigation/track.py", "motion"): "not yet grouped",
     ("sdimu_calibration/storage/bags/bag_writer.py", "write_recording"): "not yet grouped",
 }
 """Functions with more arguments, and why."""
@@ -43,8 +44,9 @@ LONG: dict[Place, str] = {
 @cache
 def functions() -> list[tuple[str, Function]]:
     return [
-        ("/".join(path.relative_to(SRC).parts[1:]), node)
-        for path in sorted(SRC.rglob("*.py"))
+        (path.relative_to(folder).as_posix(), node)
+        for folder in FOLDERS
+        for path in sorted(folder.rglob("*.py"))
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, Function)
     ]

@@ -31,7 +31,7 @@ from sdimu_calibration.core.filter.passes import pass_settings, start_state
 from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
 from sdimu_calibration.core.live_model import live_model
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
-from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S, motion
+from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S, Correction, motion
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
@@ -321,15 +321,11 @@ class LiveCalibration:
         seen = motion(
             part,
             rest,
-            sensors,
-            np.zeros(len(sensors.prior)),
+            Correction(sensors, np.zeros(len(sensors.prior))),
             self._track,
-            setup.site.latitude_rad,
-            setup.gravity,
-            self._intake.temperature_log(),
+            setup.around(self._intake.temperature_log()),
             predicted=False,
             before=self._before,
-            magnetic_n=setup.magnetic_n,
             causal=True,
         )
         self._before = seen

@@ -11,7 +11,7 @@ from sdimu_calibration.core.batch.preintegration import preintegrate
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
@@ -153,9 +153,7 @@ def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
     at_rest = np.zeros(len(prepared.cycles), dtype=bool)
 
     def go(C: np.ndarray, c: np.ndarray):
-        seen = motion(
-            prepared.cycles, at_rest, setup.sensors, c, C_nb.copy(), site.latitude_rad, setup.gravity, None, True
-        )
+        seen = motion(prepared.cycles, at_rest, Correction(setup.sensors, c), C_nb.copy(), setup.around(None), True)
         values, slope = setup.sensors.regressors(seen), error_slope(setup.sensors, seen, rows, c)
         return preintegrate(prepared, rows, setup, values, slope, c, C)
 

@@ -10,7 +10,7 @@ from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.navigation_evidence import columns
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 
 SEEDS = (101, 102, 103)
 _DRIFTS = ("gyro_bias_ramp", "gyro_g_squared", "gyro_g_sensitivity", "gyro_magnetic")
@@ -35,12 +35,9 @@ def test_regressors_of_measured_motion_make_a_dead_band_of_noise(bench):
         measured = motion(
             fit.prepared.cycles,
             fit.prepared.rest,
-            setup.sensors,
-            fit.estimate,
+            Correction(setup.sensors, fit.estimate),
             fit.last.C_start.copy(),
-            setup.site.latitude_rad,
-            setup.gravity,
-            None,
+            setup.around(None),
             predicted=False,
         )
         p = len(evidence.weight)

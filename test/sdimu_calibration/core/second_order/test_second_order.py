@@ -11,7 +11,7 @@ from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.accelerometer_frame import accelerometer_frame_model, drifting, squares_count
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_plan
@@ -99,9 +99,7 @@ def test_errors_are_undone_exactly(imu, model, site):
     true, measured = true[:n], measured[:n]
     linear = in_body_frame(bent_truth.imu.coefficients, "prior")
     c = np.array([linear[name] for name in setup.sensors.names])
-    near = motion(
-        measured, np.zeros(n, dtype=bool), setup.sensors, c, np.eye(3), site.latitude_rad, setup.gravity, None, False
-    )
+    near = motion(measured, np.zeros(n, dtype=bool), Correction(setup.sensors, c), np.eye(3), setup.around(None), False)
     clean = correct_cycles(measured, near, setup.sensors, c).cycles
     np.testing.assert_allclose(clean.t, true.t)
     # Rounding of rates of 0.03 rad/s and forces of 10 m/s^2, times a condition number near one.
@@ -117,9 +115,7 @@ def test_regressors_of_corrected_samples_are_derivatives_of_the_correction(model
     c = 0.5 * sensors.prior
 
     def go(at):
-        near = motion(
-            cycles, np.zeros(20, dtype=bool), sensors, at, np.eye(3), site.latitude_rad, setup.gravity, None, False
-        )
+        near = motion(cycles, np.zeros(20, dtype=bool), Correction(sensors, at), np.eye(3), setup.around(None), False)
         return correct_cycles(cycles, near, sensors, at)
 
     here = go(c)

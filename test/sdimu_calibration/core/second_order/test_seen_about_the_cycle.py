@@ -11,7 +11,7 @@ from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import TemperatureLog
 from sdimu_calibration.core.second_order.second_order_passes import linearise
@@ -44,12 +44,9 @@ def test_second_order_passes_see_the_rates_that_the_passes_of_the_filter_see(per
     expected = motion(
         prepared.cycles,
         prepared.rest,
-        setup.sensors,
-        nothing,
+        Correction(setup.sensors, nothing),
         np.eye(3),
-        setup.site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
+        setup.around(prepared.temperature),
         predicted=True,
     )
     assert np.abs(expected.alpha).max() > np.radians(100.0)
@@ -66,12 +63,9 @@ def test_a_filter_that_runs_while_samples_arrive_sees_no_later_temperature_or_ra
         return motion(
             cycles,
             prepared.rest[: len(cycles)],
-            setup.sensors,
-            nothing,
+            Correction(setup.sensors, nothing),
             np.eye(3),
-            setup.site.latitude_rad,
-            setup.gravity,
-            log,
+            setup.around(log),
             predicted=False,
             causal=True,
         )

@@ -21,7 +21,7 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.filter.filter_pass import PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import check_finite, pass_input, pass_settings, start_state
 from sdimu_calibration.core.measurement_kind import SKIP
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import TemperatureLog
@@ -121,14 +121,10 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
     seen = motion(
         prepared.cycles,
         prepared.rest,
-        sensors,
-        reference,
+        Correction(sensors, reference),
         C_nb,
-        setup.site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
+        setup.around(prepared.temperature),
         predicted=True,
-        magnetic_n=setup.magnetic_n,
     )
     data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
     output = new_output(len(prepared.epochs), len(prior), False, len(prepared.epochs))
@@ -161,15 +157,11 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     seen = motion(
         cycles,
         prepared.rest[skipped:],
-        sensors,
-        np.zeros(len(sensors.prior)),
+        Correction(sensors, np.zeros(len(sensors.prior))),
         C_nb,
-        setup.site.latitude_rad,
-        setup.gravity,
-        at.temperature,
+        setup.around(at.temperature),
         predicted=True,
         before=at.seen,
-        magnetic_n=setup.magnetic_n,
     )
     data = pass_input(replace(prepared, cycles=cycles), sensors.regressors(seen), sensors.channel, sensors.parameter)
     data = data._replace(**{name: getattr(data, name)[new] for name in _BY_EPOCH})

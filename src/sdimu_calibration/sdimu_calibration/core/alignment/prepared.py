@@ -30,7 +30,7 @@ from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.measurement_kind import ALL, SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
-from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD
+from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, Surroundings
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, DataFault, Recording, TemperatureLog
 from sdimu_calibration.core.specification import EPOCH_S, MOST_EPOCHS, ImuSpecification, Model, Site
 from sdimu_calibration.core.wording import Option
@@ -74,6 +74,10 @@ class TestSetup:
         """Magnetic field of the site in NED (T), shape (3,); that of mid-northern latitudes where none is stated."""
         stated = self.site.magnetic_field_t
         return MAGNETIC_FIELD if stated is None else np.array(stated)
+
+    def around(self, temperature: TemperatureLog | None) -> Surroundings:
+        """Return what is about the IMU at the site, at the temperature that was measured."""
+        return Surroundings(self.site.latitude_rad, self.gravity, temperature, self.magnetic_n)
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ from sdimu_calibration.core.batch.preintegration import Preintegration, preinteg
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
@@ -172,14 +172,10 @@ def _seen(prepared: PreparedData, setup: TestSetup, where: Layout, point: Linear
     seen = motion(
         prepared.cycles,
         at_stop,
-        setup.sensors,
-        point.coefficients,
+        Correction(setup.sensors, point.coefficients),
         point.C_nb[0].copy(),
-        latitude,
-        setup.gravity,
-        prepared.temperature,
+        setup.around(prepared.temperature),
         predicted=True,
-        magnetic_n=setup.magnetic_n,
     )
     drift = point.C_nb @ np.transpose(seen.C_nb[where.stop_last - 1], (0, 2, 1))
     C_nb = np.where(at_stop[:, None, None], point.C_nb[stop], drift[stop] @ seen.C_nb)

@@ -31,7 +31,7 @@ from sdimu_calibration.core.evidence.signatures import (
 )
 from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.second_order.second_order_passes import (
     SecondOrderPass,
     firm_setup,
@@ -142,15 +142,10 @@ def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> Know
     seen = motion(
         prepared.cycles,
         prepared.rest,
-        setup.sensors,
-        finished.estimate,
+        Correction(setup.sensors, finished.estimate, finished.data.values),
         finished.C_start.copy(),
-        setup.site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
+        setup.around(prepared.temperature),
         predicted=True,
-        magnetic_n=setup.magnetic_n,
-        near=finished.data.values,
     )
     return KnownPass(output, seen, None)
 

@@ -33,7 +33,7 @@ from sdimu_calibration.core.filter.filter_pass import (
 from sdimu_calibration.core.filter.impossible_prior import impossible_prior
 from sdimu_calibration.core.filter.pass_loop import AnyPass, Ending, FinishedPass, until_nothing_moves
 from sdimu_calibration.core.measurement_kind import SKIP
-from sdimu_calibration.core.navigation.track import motion
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.rotation import rotation_vector
@@ -179,15 +179,10 @@ def motion_about(
     return motion(
         prepared.cycles,
         prepared.rest,
-        setup.sensors,
-        reference,
+        Correction(setup.sensors, reference, near),
         C_nb.copy(),
-        setup.site.latitude_rad,
-        setup.gravity,
-        prepared.temperature,
+        setup.around(prepared.temperature),
         predicted=predicted,
-        magnetic_n=setup.magnetic_n,
-        near=near,
         causal=causal,
     )
 

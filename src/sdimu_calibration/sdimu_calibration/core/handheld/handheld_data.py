@@ -23,7 +23,7 @@ from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
-from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, motion, temperatures
+from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, Correction, Surroundings, motion, temperatures
 from sdimu_calibration.core.recording import Recording, TemperatureLog
 
 _UNSEEN_S = 0.25
@@ -216,7 +216,8 @@ def turns(run: HandheldRun, model: ImuModel, coefficients: Floats, C_nb: Floats,
     cycles = run.cycles
     none = np.zeros(len(cycles), dtype=bool)
     # Earth rate is below what the gyros know of themselves here: the table's rate and the body's are one.
-    near = motion(cycles, none, model, coefficients, C_nb[0].copy(), 0.0, gravity, run.temperature, predicted=False)
+    around = Surroundings(0.0, gravity, run.temperature)
+    near = motion(cycles, none, Correction(model, coefficients), C_nb[0].copy(), around, predicted=False)
     clean = correct_cycles(cycles, near, model, coefficients)
     phi = clean.cycles.alpha + clean.cycles.coning
     middle, end = _integrate(np.ascontiguousarray(C_nb), run.first, run.last, np.ascontiguousarray(phi))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -95,19 +96,53 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
     return np.interp(t, log.t, log.value) - log.origin_degc, rise / np.maximum(high - low, 1e-3)
 
 
+@dataclass(frozen=True)
+class Surroundings:
+    """What is about the IMU during a test.
+
+    Attributes
+    ----------
+    latitude : float
+        Of the site (rad).
+    gravity : float
+        At the site (m/s^2).
+    temperature : TemperatureLog or None
+        None: nobody measured it.
+    magnetic_n : ndarray, shape (3,)
+        Magnetic field in NED (T).
+    """
+
+    latitude: float
+    gravity: float
+    temperature: TemperatureLog | None = None
+    magnetic_n: Floats = field(default_factory=MAGNETIC_FIELD.copy)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Sensor errors that are taken out of samples.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+        Of the model (SI).
+    near : ndarray, shape (n, m), or None
+        Regressors along nearly the same motion: the compensation begins with them.
+    """
+
+    model: ImuModel
+    coefficients: Floats
+    near: Floats | None = None
+
+
 def motion(
     cycles: Cycles,
     rest: Bools,
-    model: ImuModel,
-    coefficients: Floats,
+    correction: Correction,
     C_start: Floats,
-    latitude: float,
-    gravity: float,
-    temperature: TemperatureLog | None,
+    around: Surroundings,
     predicted: bool,
     before: Motion | None = None,
-    magnetic_n: Floats = MAGNETIC_FIELD,
-    near: Floats | None = None,
     causal: bool = False,
 ) -> Motion:
     """Motion of each cycle, as the effects see it.
@@ -116,21 +151,17 @@ def motion(
     ----------
     rest : ndarray of bool, shape (n,)
         Cycles in dwell.
-    model, coefficients : ImuModel and ndarray, shape (p,)
+    correction : Correction
         Sensor errors taken out of the samples.
     C_start : ndarray, shape (3, 3)
         Attitude at the start; moved to the end of the cycles, in place.
-    latitude, gravity : float
-        Of the site (rad, m/s^2).
+    around : Surroundings
+        Site, temperature and magnetic field.
     predicted : bool
         Put the rate and force that the attitude predicts in place of the measured ones at rest, so that regressors
         such as sign(w) carry no noise there. Needs a good `C_start` and coefficients.
     before : Motion, optional
         Motion of the block before this one, where blocks follow each other.
-    magnetic_n : ndarray, shape (3,)
-        Magnetic field in NED (T).
-    near : ndarray, shape (n, m), optional
-        Regressors along nearly the same motion: the compensation begins with them.
     causal : bool
         Take the rate of the temperature and the angular acceleration from what came before, as a filter must that
         runs while the samples arrive. Both are then late, by 30 s and by half a cycle; whoever has the whole
@@ -138,19 +169,20 @@ def motion(
     """
     dt = cycles.dt
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
-    heat, heat_rate = temperatures(temperature, cycles.t - 0.5 * dt, causal)
+    heat, heat_rate = temperatures(around.temperature, cycles.t - 0.5 * dt, causal)
     C0 = C_start.copy()
+    model, coefficients, near = correction.model, correction.coefficients, correction.near
     rounds = _COMPENSATIONS if np.any(coefficients) else 0
     error = model.errors(near, coefficients) if rounds and near is not None else np.zeros((len(dt), 6))
     earlier = _AtStart.of(before)
     past = NO_PAST if before is None else before.left
-    w_ie = earth.earth_rate(latitude)
+    w_ie = earth.earth_rate(around.latitude)
     for done in range(rounds + 1):
         C = C0.copy()
         w, f = w_measured - error[:, :3], f_measured - error[:, 3:]
-        C_nb = _attitudes(C, w * dt[:, None], cycles.coning, dt, latitude)
+        C_nb = _attitudes(C, w * dt[:, None], cycles.coning, dt, around.latitude)
         w_seen, f_seen, w_table, turned, leant, since_turn, wound = _seen(
-            C_nb, w, f, rest, cycles.t, dt, w_ie, gravity, predicted, earlier
+            C_nb, w, f, rest, cycles.t, dt, w_ie, around.gravity, predicted, earlier
         )
         alpha = _acceleration(w_table, rest, cycles, before, causal)
         seen = Motion(
@@ -167,7 +199,7 @@ def motion(
             turned,
             leant,
             since_turn,
-            magnetic_n,
+            around.magnetic_n,
             wound,
             past,
         )
