@@ -21,7 +21,7 @@ from sdimu_calibration.core.recording import Recording, TableLog
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.report_extras import ReportExtras, report_extras
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.files.result_file import write_result
 
@@ -71,13 +71,15 @@ class SmallTest:
         """Write all of it to a bag; return its folder."""
         write_recording(
             path,
-            start_ns=START_NS,
-            imu_ns=self.ns,
-            omega_ib_b=self.omega_ib_b,
-            f_ib_b=self.f_ib_b,
-            status=(self.slow_ns, self.dwell, self.stop),
-            joint_states=(self.ns, self.names, self.angle, self.rate),
-            temperature=(self.slow_ns, self.temperature),
+            BagContent(
+                start_ns=START_NS,
+                imu_ns=self.ns,
+                omega_ib_b=self.omega_ib_b,
+                f_ib_b=self.f_ib_b,
+                status=(self.slow_ns, self.dwell, self.stop),
+                joint_states=(self.ns, self.names, self.angle, self.rate),
+                temperature=(self.slow_ns, self.temperature),
+            ),
         )
         return path
 

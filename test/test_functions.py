@@ -26,7 +26,6 @@ MANY_ARGUMENTS: dict[Place, str] = {
     ("sdimu_calibration/core/data/resting_cycles.py", "_join"): "compiled",
     ("sdimu_calibration/core/filter/filter_pass.py", "_navigate_epoch"): "compiled",
     ("sdimu_calibration/core/navigation/track.py", "_seen"): "compiled",
-    ("sdimu_calibration/storage/bags/bag_writer.py", "write_recording"): "not yet grouped",
 }
 """Functions with more arguments, and why."""
 DEEP: dict[Place, str] = {}

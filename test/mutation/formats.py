@@ -23,7 +23,7 @@ from sdimu_calibration.report.table import rows
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_info import read_info
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.recover import recover
@@ -85,13 +85,15 @@ def write_bag(folder: Path) -> Path:
     slow = ns[::40]
     write_recording(
         folder,
-        start_ns=1_700_000_000_000_000_000,
-        imu_ns=ns,
-        omega_ib_b=rng.standard_normal((SAMPLES, 3)),
-        f_ib_b=rng.standard_normal((SAMPLES, 3)),
-        status=(slow, slow % 3 > 0, np.arange(len(slow))),
-        joint_states=(slow, ("outer", "inner"), np.zeros((len(slow), 2)), np.zeros((len(slow), 2))),
-        temperature=(slow, 20.0 + rng.standard_normal(len(slow))),
+        BagContent(
+            start_ns=1_700_000_000_000_000_000,
+            imu_ns=ns,
+            omega_ib_b=rng.standard_normal((SAMPLES, 3)),
+            f_ib_b=rng.standard_normal((SAMPLES, 3)),
+            status=(slow, slow % 3 > 0, np.arange(len(slow))),
+            joint_states=(slow, ("outer", "inner"), np.zeros((len(slow), 2)), np.zeros((len(slow), 2))),
+            temperature=(slow, 20.0 + rng.standard_normal(len(slow))),
+        ),
     )
     return folder
 

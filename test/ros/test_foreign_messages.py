@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_file import raw_messages
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cdr import JOINT_STATE
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.result_file import read_result
@@ -43,11 +43,13 @@ def driver(path: Path, status: bool) -> np.ndarray:
     at = (second * 1e9).astype(np.int64)
     write_recording(
         path,
-        start_ns=START,
-        imu_ns=ns,
-        omega_ib_b=np.degrees(r.omega_ib_b),
-        f_ib_b=r.f_ib_b / G,
-        status=(at, r.phase.dwell[row], r.phase.stop[row]) if status else None,
+        BagContent(
+            start_ns=START,
+            imu_ns=ns,
+            omega_ib_b=np.degrees(r.omega_ib_b),
+            f_ib_b=r.f_ib_b / G,
+            status=(at, r.phase.dwell[row], r.phase.stop[row]) if status else None,
+        ),
     )
     return START + ns
 

@@ -36,7 +36,7 @@ from sdimu_calibration.nodes.diagnosis_worker import Answer, Diagnoser, Picture,
 from sdimu_calibration.nodes.live_diagnosis import Worker
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.files.diagnosis_file import odds
 from sdimu_calibration.storage.files.journal import Journal, digest
@@ -99,11 +99,13 @@ def bag(raw: RawTest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     bag = tmp_path_factory.mktemp("bag") / "bag"
     write_recording(
         bag,
-        start_ns=START,
-        imu_ns=raw.ns - START,
-        omega_ib_b=raw.omega_ib_b,
-        f_ib_b=raw.f_ib_b,
-        status=(raw.status.ns - START, raw.status.dwell, raw.status.stop),
+        BagContent(
+            start_ns=START,
+            imu_ns=raw.ns - START,
+            omega_ib_b=raw.omega_ib_b,
+            f_ib_b=raw.f_ib_b,
+            status=(raw.status.ns - START, raw.status.dwell, raw.status.stop),
+        ),
     )
     return bag
 

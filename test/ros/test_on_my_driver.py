@@ -17,7 +17,7 @@ from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.files.result_file import read_result
@@ -78,7 +78,7 @@ def test_a_driver_of_best_effort_with_jitter_and_without_phases_is_calibrated(be
     assert live.data["stops"] == 3
     assert "samples are taken as even" in " ".join(live.notes)
     bag, again = bench.folder / "whole", bench.folder / "again"
-    write_recording(bag, start_ns=START, imu_ns=ns, omega_ib_b=r.omega_ib_b, f_ib_b=r.f_ib_b)
+    write_recording(bag, BagContent(start_ns=START, imu_ns=ns, omega_ib_b=r.omega_ib_b, f_ib_b=r.f_ib_b))
     process = sdimu("calibrate", bag, "--imu", "dtg", "--site", "daejeon", "--out", again)
     _, err = process.communicate(timeout=DEADLINE_S)
     assert process.returncode in (0, 3), err

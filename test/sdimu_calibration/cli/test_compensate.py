@@ -16,7 +16,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.bags.bag_file import raw_messages
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cdr import IMU, decode_doubles
 from sdimu_calibration.storage.bags.topic_choice import Topics
 from sdimu_calibration.storage.files.config import load_imu
@@ -72,11 +72,13 @@ def test_a_result_that_is_none_is_one_line(bag: Path, tmp_path: Path) -> None:
 def test_a_bag_with_topics_of_other_names_is_compensated_too(tmp_path: Path, small_test) -> None:
     write_recording(
         tmp_path / "other",
-        start_ns=10**18,
-        imu_ns=small_test.ns,
-        omega_ib_b=small_test.omega_ib_b,
-        f_ib_b=small_test.f_ib_b,
-        temperature=(small_test.slow_ns, small_test.temperature),
+        BagContent(
+            start_ns=10**18,
+            imu_ns=small_test.ns,
+            omega_ib_b=small_test.omega_ib_b,
+            f_ib_b=small_test.f_ib_b,
+            temperature=(small_test.slow_ns, small_test.temperature),
+        ),
         topics=Topics(imu="/xsens/imu", temperature="/xsens/warmth"),
     )
     write_result(tmp_path / "result.json", result("gyro_bias", "accel_bias"))

@@ -14,7 +14,7 @@ import pytest
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.catalogue import page
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -53,11 +53,13 @@ def hidden(tmp_path_factory):
     path = tmp_path_factory.mktemp("bags") / "hidden"
     write_recording(
         path,
-        start_ns=recording.start_ns,
-        imu_ns=np.round(recording.t * 1e9).astype(np.int64),
-        omega_ib_b=recording.omega_ib_b,
-        f_ib_b=recording.f_ib_b,
-        status=(np.round(recording.phase.t * 1e9).astype(np.int64), recording.phase.dwell, recording.phase.stop),
+        BagContent(
+            start_ns=recording.start_ns,
+            imu_ns=np.round(recording.t * 1e9).astype(np.int64),
+            omega_ib_b=recording.omega_ib_b,
+            f_ib_b=recording.f_ib_b,
+            status=(np.round(recording.phase.t * 1e9).astype(np.int64), recording.phase.dwell, recording.phase.stop),
+        ),
     )
     return path
 

@@ -11,7 +11,7 @@ from sdimu_calibration.cli.noise import noise
 from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu
 
 DT = 0.02
@@ -26,10 +26,12 @@ def still(tmp_path: Path) -> Path:
     force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
     write_recording(
         tmp_path / "still",
-        start_ns=10**18,
-        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
-        omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)),
-        f_ib_b=force,
+        BagContent(
+            start_ns=10**18,
+            imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
+            omega_ib_b=GYRO / np.sqrt(DT) * rng.standard_normal((n, 3)),
+            f_ib_b=force,
+        ),
     )
     return tmp_path / "still"
 
@@ -56,10 +58,7 @@ def test_pulses_and_wandering_bias_go_into_the_file(tmp_path: Path) -> None:
     force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
     write_recording(
         tmp_path / "still",
-        start_ns=10**18,
-        imu_ns=np.arange(1, n + 1) * round(DT * 1e9),
-        omega_ib_b=counted,
-        f_ib_b=force,
+        BagContent(start_ns=10**18, imu_ns=np.arange(1, n + 1) * round(DT * 1e9), omega_ib_b=counted, f_ib_b=force),
     )
     noise(tmp_path / "still", out=tmp_path / "out")
     found = load_imu(tmp_path / "out" / "imu.yaml")

@@ -8,7 +8,7 @@ import yaml
 from typer.testing import CliRunner
 
 from sdimu_calibration.cli.main import app
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def static(tmp_path):
     ns = np.arange(1, 3001, dtype=np.int64) * 20_000_000
     rate = [0.02, -0.03, 0.05] + 0.05 * rng.standard_normal((3000, 3))
     force = [0.0, 0.0, 1.003] + 0.002 * rng.standard_normal((3000, 3))
-    write_recording(tmp_path / "bag", start_ns=0, imu_ns=ns, omega_ib_b=rate, f_ib_b=force)
+    write_recording(tmp_path / "bag", BagContent(start_ns=0, imu_ns=ns, omega_ib_b=rate, f_ib_b=force))
     return tmp_path
 
 

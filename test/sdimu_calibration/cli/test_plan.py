@@ -15,7 +15,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.known import Standing, known_of
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import find_config, load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.model_choice import named_model
@@ -112,10 +112,9 @@ def elsewhere(tmp_path, monkeypatch):
         shutil.copy(find_config(kind, name), tmp_path / f"{kind}_of_mine.yaml")
     write_recording(
         tmp_path / "bag",
-        start_ns=10**18,
-        imu_ns=np.arange(1, 3) * 10**7,
-        omega_ib_b=np.zeros((2, 3)),
-        f_ib_b=np.zeros((2, 3)),
+        BagContent(
+            start_ns=10**18, imu_ns=np.arange(1, 3) * 10**7, omega_ib_b=np.zeros((2, 3)), f_ib_b=np.zeros((2, 3))
+        ),
     )
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path)

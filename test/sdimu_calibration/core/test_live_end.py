@@ -12,7 +12,7 @@ from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import UNNUMBERED, DataError
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
 from sdimu_sim.core.scenario import Scenario, generate
@@ -145,12 +145,14 @@ def recorded(path, m):
     status = None if m.status is None else (m.status[0] - START, *m.status[1:])
     write_recording(
         path,
-        start_ns=START,
-        imu_ns=m.ns - START,
-        omega_ib_b=m.w,
-        f_ib_b=m.f,
-        status=status,
-        temperature=(m.temperature[0] - START, m.temperature[1]),
+        BagContent(
+            start_ns=START,
+            imu_ns=m.ns - START,
+            omega_ib_b=m.w,
+            f_ib_b=m.f,
+            status=status,
+            temperature=(m.temperature[0] - START, m.temperature[1]),
+        ),
     )
     return path
 

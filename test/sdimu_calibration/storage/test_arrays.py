@@ -9,7 +9,7 @@ import pytest
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.arrays import raw_test
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 
 START_NS = 1_700_000_000_000_000_000
 
@@ -32,11 +32,13 @@ def test_arrays_open_as_a_bag_of_the_same_samples_does(samples, opened, recordin
     phase = recording.phase
     bag = write_recording(
         tmp_path / "bag",
-        start_ns=START_NS,
-        imu_ns=samples["ns"] - START_NS,
-        omega_ib_b=recording.omega_ib_b,
-        f_ib_b=recording.f_ib_b,
-        status=(np.round(phase.t * 1e9).astype(np.int64), phase.dwell, phase.stop),
+        BagContent(
+            start_ns=START_NS,
+            imu_ns=samples["ns"] - START_NS,
+            omega_ib_b=recording.omega_ib_b,
+            f_ib_b=recording.f_ib_b,
+            status=(np.round(phase.t * 1e9).astype(np.int64), phase.dwell, phase.stop),
+        ),
     )
     other = sdimu.open(bag or tmp_path / "bag", site="daejeon", imu="dtg")
     np.testing.assert_array_equal(opened.recording.t, other.recording.t)

@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 
@@ -23,12 +23,14 @@ def bag(tmp_path):
     status = (np.array([0, 3_000_000_000, 6_000_000_000]), np.array([True, False, True]), np.array([0, 0, 1]))
     write_recording(
         tmp_path / "bag",
-        start_ns=START,
-        imu_ns=ns,
-        omega_ib_b=rng.normal(size=(N, 3)),
-        f_ib_b=rng.normal(size=(N, 3)),
-        status=status,
-        temperature=(np.array([0, 5_000_000_000]), np.array([20.0, 21.0])),
+        BagContent(
+            start_ns=START,
+            imu_ns=ns,
+            omega_ib_b=rng.normal(size=(N, 3)),
+            f_ib_b=rng.normal(size=(N, 3)),
+            status=status,
+            temperature=(np.array([0, 5_000_000_000]), np.array([20.0, 21.0])),
+        ),
     )
     return tmp_path / "bag"
 

@@ -21,7 +21,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_info import read_info
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.recover import recover
@@ -236,10 +236,12 @@ def test_a_recording_without_noise_unpacks(tmp_path):
     n = 30_000
     write_recording(
         tmp_path / "b",
-        start_ns=10**18,
-        imu_ns=np.arange(1, n + 1) * 10_000_000,
-        omega_ib_b=np.zeros((n, 3)),
-        f_ib_b=np.zeros((n, 3)),
+        BagContent(
+            start_ns=10**18,
+            imu_ns=np.arange(1, n + 1) * 10_000_000,
+            omega_ib_b=np.zeros((n, 3)),
+            f_ib_b=np.zeros((n, 3)),
+        ),
     )
     file = next((tmp_path / "b").glob("*.mcap"))
     assert n * 356 < 60 * file.stat().st_size
@@ -252,12 +254,14 @@ def test_reading_needs_the_memory_of_the_numbers(tmp_path, small_test):
     made = type(small_test)(n)
     write_recording(
         tmp_path / "long",
-        start_ns=10**18,
-        imu_ns=made.ns,
-        omega_ib_b=made.omega_ib_b,
-        f_ib_b=made.f_ib_b,
-        status=(made.slow_ns, made.dwell, made.stop),
-        temperature=(made.slow_ns, made.temperature),
+        BagContent(
+            start_ns=10**18,
+            imu_ns=made.ns,
+            omega_ib_b=made.omega_ib_b,
+            f_ib_b=made.f_ib_b,
+            status=(made.slow_ns, made.dwell, made.stop),
+            temperature=(made.slow_ns, made.temperature),
+        ),
     )
     tracemalloc.start()
     try:

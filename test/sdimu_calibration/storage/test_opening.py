@@ -12,7 +12,7 @@ import pytest
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.topic_choice import TopicChoice, Topics
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.opening import Source, open_recording, open_test
@@ -48,12 +48,14 @@ def write(path, w=1.0, f=1.0, late_s=0.0, warm_at_s=0.0, topics=None, r=None):
     row = np.searchsorted(r.phase.t, second, side="right") - 1
     write_recording(
         path,
-        start_ns=START_NS,
-        imu_ns=ns(r.t),
-        omega_ib_b=r.omega_ib_b * w,
-        f_ib_b=r.f_ib_b * f,
-        status=(ns(second + late_s), r.phase.dwell[row], r.phase.stop[row]),
-        temperature=(ns(second + warm_at_s), 20.0 + 0.0 * second),
+        BagContent(
+            start_ns=START_NS,
+            imu_ns=ns(r.t),
+            omega_ib_b=r.omega_ib_b * w,
+            f_ib_b=r.f_ib_b * f,
+            status=(ns(second + late_s), r.phase.dwell[row], r.phase.stop[row]),
+            temperature=(ns(second + warm_at_s), 20.0 + 0.0 * second),
+        ),
         topics=topics,
     )
     return path

@@ -13,7 +13,7 @@ import pytest
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.recording import Recording, TemperatureLog
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.recover import recover
 from sdimu_calibration.storage.files.result_file import read_result, write_result
@@ -26,10 +26,12 @@ def bag(tmp_path):
     rng = np.random.default_rng(1)
     write_recording(
         tmp_path / "bag",
-        start_ns=10**18,
-        imu_ns=np.arange(1, n + 1) * 10**7,
-        omega_ib_b=1e-4 * rng.standard_normal((n, 3)),
-        f_ib_b=rng.standard_normal((n, 3)),
+        BagContent(
+            start_ns=10**18,
+            imu_ns=np.arange(1, n + 1) * 10**7,
+            omega_ib_b=1e-4 * rng.standard_normal((n, 3)),
+            f_ib_b=rng.standard_normal((n, 3)),
+        ),
         custom={"serial": "SN 17", "power_on": "3", "room": "B"},
     )
     return tmp_path / "bag"

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import imu_messages
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.imu_messages import SampleFile
 
 
@@ -20,10 +20,12 @@ def bag(tmp_path):
     ns = np.arange(1, 20_001) * 10_000_000
     write_recording(
         tmp_path / "bag",
-        start_ns=10**18,
-        imu_ns=ns,
-        omega_ib_b=rng.standard_normal((20_000, 3)),
-        f_ib_b=rng.standard_normal((20_000, 3)),
+        BagContent(
+            start_ns=10**18,
+            imu_ns=ns,
+            omega_ib_b=rng.standard_normal((20_000, 3)),
+            f_ib_b=rng.standard_normal((20_000, 3)),
+        ),
     )
     return tmp_path / "bag"
 

@@ -16,7 +16,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_info import read_info
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 from sdimu_calibration.storage.bags.topic_choice import TopicChoice, Topics
 
@@ -29,13 +29,15 @@ ELSEWHERE = Topics("/xsens/imu", "/table/state", "/table/axes", "/xsens/temp")
 def write(path: Path, test, topics: Topics) -> Path:
     write_recording(
         path,
-        start_ns=START_NS,
-        imu_ns=test.ns,
-        omega_ib_b=test.omega_ib_b,
-        f_ib_b=test.f_ib_b,
-        status=(test.slow_ns, test.dwell, test.stop),
-        joint_states=(test.ns, test.names, test.angle, test.rate),
-        temperature=(test.slow_ns, test.temperature),
+        BagContent(
+            start_ns=START_NS,
+            imu_ns=test.ns,
+            omega_ib_b=test.omega_ib_b,
+            f_ib_b=test.f_ib_b,
+            status=(test.slow_ns, test.dwell, test.stop),
+            joint_states=(test.ns, test.names, test.angle, test.rate),
+            temperature=(test.slow_ns, test.temperature),
+        ),
         topics=topics,
     )
     return path

@@ -19,7 +19,7 @@ from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_folder import check_apart
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
 from sdimu_calibration.storage.bags.mcap_bag import McapBag
 from sdimu_calibration.storage.bags.recover import recover
@@ -110,10 +110,7 @@ def test_a_bag_with_something_else_beside_it_is_not_replaced(bag, small_test):
     with pytest.raises(DataError, match=r"notes\.txt"):
         write_recording(
             bag,
-            start_ns=0,
-            imu_ns=small_test.ns,
-            omega_ib_b=small_test.omega_ib_b,
-            f_ib_b=small_test.f_ib_b,
+            BagContent(start_ns=0, imu_ns=small_test.ns, omega_ib_b=small_test.omega_ib_b, f_ib_b=small_test.f_ib_b),
             replace=True,
         )
     assert (bag / "notes.txt").read_text() == "the only copy"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +16,39 @@ from sdimu_calibration.storage.bags.topic_choice import Topics
 Stamps = Ints
 
 
+@dataclass(frozen=True)
+class BagContent:
+    """What the topics of a test hold.
+
+    Attributes
+    ----------
+    start_ns : int
+        Added to every stamp: the time (ns since 1970) at which the test began.
+    imu_ns : ndarray, shape (n,)
+        End of each sample's interval (ns after `start_ns`).
+    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+        Mean rate (rad/s) and specific force (m/s^2) over the interval, in the frame of the IMU.
+    status : (ndarray (m,), ndarray of bool (m,), ndarray of int (m,)) or None
+        Stamp (ns after `start_ns`), True for dwell, index of the stop.
+    joint_states : (ndarray (l,), tuple of str (k), ndarray (l, k), ndarray (l, k)) or None
+        Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s).
+    temperature : (ndarray (o,), ndarray (o,)) or None
+        Stamp (ns after `start_ns`), temperature (deg C).
+    """
+
+    start_ns: int
+    imu_ns: Stamps
+    omega_ib_b: Floats
+    f_ib_b: Floats
+    status: tuple[Stamps, Bools, Ints] | None = None
+    joint_states: tuple[Stamps, tuple[str, ...], Floats, Floats] | None = None
+    temperature: tuple[Stamps, Floats] | None = None
+
+
 def write_recording(
     path: Path,
+    content: BagContent,
     *,
-    start_ns: int,
-    imu_ns: Stamps,
-    omega_ib_b: Floats,
-    f_ib_b: Floats,
-    status: tuple[Stamps, Bools, Ints] | None = None,
-    joint_states: tuple[Stamps, tuple[str, ...], Floats, Floats] | None = None,
-    temperature: tuple[Stamps, Floats] | None = None,
     topics: Topics | None = None,
     replace: bool = False,
     custom: Mapping[str, str] | None = None,
@@ -35,35 +59,26 @@ def write_recording(
     ----------
     path : Path
         Folder to make.
-    start_ns : int
-        Added to every stamp: the time (ns since 1970) at which the test began.
-    imu_ns : ndarray, shape (n,)
-        End of each sample's interval (ns after `start_ns`).
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        Mean rate (rad/s) and specific force (m/s^2) over the interval, in the frame of the IMU.
-    status : (ndarray (m,), ndarray of bool (m,), ndarray of int (m,)), optional
-        Stamp (ns after `start_ns`), True for dwell, index of the stop.
-    joint_states : (ndarray (l,), tuple of str (k), ndarray (l, k), ndarray (l, k)), optional
-        Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s).
-    temperature : (ndarray (o,), ndarray (o,)), optional
-        Stamp (ns after `start_ns`), temperature (deg C).
+    topics : Topics, optional
+        Names of the topics; by default those of the simulators.
     replace : bool
         Delete a bag that is already there.
     custom : mapping of str to str, optional
         What the user says of the recording: ``serial``, ``power_on``.
     """
-    topics = topics or Topics()
-    streams = {topics.imu: (cdr.IMU, imu_ns, cdr.encode_imu(imu_ns + start_ns, omega_ib_b, f_ib_b))}
-    if status is not None:
-        ns, dwell, stop = status
+    topics, start_ns, imu_ns = topics or Topics(), content.start_ns, content.imu_ns
+    samples = cdr.encode_imu(imu_ns + start_ns, content.omega_ib_b, content.f_ib_b)
+    streams = {topics.imu: (cdr.IMU, imu_ns, samples)}
+    if content.status is not None:
+        ns, dwell, stop = content.status
         # At the same stamp the status goes first, as it holds from that stamp on.
         streams = {topics.status: (cdr.STATUS, ns, cdr.encode_status(ns + start_ns, dwell, stop))} | streams
-    if joint_states is not None:
-        ns, names, position, velocity = joint_states
+    if content.joint_states is not None:
+        ns, names, position, velocity = content.joint_states
         encoded = cdr.encode_joint_states(ns + start_ns, names, position, velocity)
         streams[topics.joint_states] = (cdr.JOINT_STATE, ns, encoded)
-    if temperature is not None:
-        ns, value = temperature
+    if content.temperature is not None:
+        ns, value = content.temperature
         streams[topics.temperature] = (cdr.TEMPERATURE, ns, cdr.encode_temperature(ns + start_ns, value))
     with McapBag(path, replace=replace, custom=custom) as bag:
         for topic, (type_name, _, _) in streams.items():

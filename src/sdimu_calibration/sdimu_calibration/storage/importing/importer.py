@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.resample import mean_over, same_stamps
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bags.bag_writer import write_recording
+from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
 from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap
 from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
@@ -148,12 +148,14 @@ def write_imported(path: Path, found: Imported, replace: bool = False, custom: M
     """
     write_recording(
         path,
-        start_ns=0,
-        imu_ns=found.ns,
-        omega_ib_b=found.omega_ib_b,
-        f_ib_b=found.f_ib_b,
-        temperature=found.temperature,
-        status=found.status,
+        BagContent(
+            start_ns=0,
+            imu_ns=found.ns,
+            omega_ib_b=found.omega_ib_b,
+            f_ib_b=found.f_ib_b,
+            temperature=found.temperature,
+            status=found.status,
+        ),
         replace=replace,
         custom=custom,
     )
