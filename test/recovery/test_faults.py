@@ -159,7 +159,7 @@ def test_stamps_that_many_readings_share_are_no_times():
     n = 400
     values = np.random.default_rng(1).standard_normal((n, 3))
     pairs = np.repeat(np.arange(1, n // 2 + 1, dtype=np.int64), 2) * 20_000_000
-    with pytest.raises(DataError, match="are no sample times"):
+    with pytest.raises(DataError, match="are not the times of the samples"):
         arrange(pairs, values, values, "here")
     # Every sample sent twice is another thing: nothing about its time is wrong.
     twice = np.repeat(values[: n // 2], 2, axis=0)

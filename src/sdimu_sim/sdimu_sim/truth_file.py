@@ -82,7 +82,7 @@ def check_truth_room(path: Path, bag: Path, replace: bool) -> None:
     if not os.path.lexists(path):
         return
     if not _is_truth(path):
-        raise DataError(f"{path}: is there already, and no truth file; name another one with --truth")
+        raise DataError(f"{path}: another file than a truth file is there; name another place with --truth")
     if not replace and (path != usual_truth(bag) or bag.exists()):
         raise DataError(f"{path}: a truth file is already there; --replace replaces it, or name another with --truth")
 

@@ -129,5 +129,5 @@ def test_a_certificate_without_a_unit_is_refused_with_the_units_there_are(batch)
     folder = batch(units=3)
     with pytest.raises(DataError, match=r"SN0, SN1, SN2"):
         datasheet([folder], certificate=True)
-    with pytest.raises(DataError, match="no result of it"):
+    with pytest.raises(DataError, match="no result has this serial number"):
         datasheet([folder], serial="X")

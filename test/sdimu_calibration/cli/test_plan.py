@@ -81,7 +81,7 @@ def test_the_shortest_recording_that_tells_them_apart_turns_at_another_rate(fold
 
 
 def test_results_beside_others_may_count_a_recording_twice_and_are_refused(folder):
-    with pytest.raises(DataError, match="stand alone"):
+    with pytest.raises(DataError, match="one result alone"):
         plan(plan="kim18", after=[folder, folder])
 
 

@@ -70,7 +70,7 @@ def test_without_a_port_two_tests_have_two_pages():
 
 @pytest.mark.parametrize("stated", [{"port": 8051}, {"host": "127.0.0.1"}, {"no_browser": True}])
 def test_an_option_of_the_page_without_the_page_is_refused(stated):
-    with pytest.raises(DataError, match=f"--{next(iter(stated)).replace('_', '-')}: there is no page without --open"):
+    with pytest.raises(DataError, match=f"--{next(iter(stated)).replace('_', '-')}: only the live page takes it"):
         PageOptions(**stated).check()
 
 

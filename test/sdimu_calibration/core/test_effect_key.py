@@ -64,8 +64,8 @@ def test_what_is_no_key_is_refused_in_one_line(text, message):
         ("gyro_bias_warm_up(t0=300 s)", r"expected gyro_bias_warm_up\(tau=1 s\), not '\(t0=300 s\)'"),
         ("gyro_lost_data(turn=1, at=20)", "at: '20' has no unit"),
         ("accel_quadratic(tau=3 s)", "takes no options"),
-        ("accel_quadratic_x=20 ug/g^2", "a size is for a simulation"),
-        ("gyro_x: ey^2=1 deg/h", "a size is for a simulation"),
+        ("accel_quadratic_x=20 ug/g^2", "only a simulation takes a size"),
+        ("gyro_x: ey^2=1 deg/h", "only a simulation takes a size"),
     ],
 )
 def test_the_estimator_refuses_a_number_without_its_unit_and_a_size(text, message):

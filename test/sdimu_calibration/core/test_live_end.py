@@ -122,7 +122,7 @@ def stray_status(m):
     """One status with a stamp of zero, one of a year ahead."""
     at, dwell, stop = m.status
     status = (np.concatenate([[0], at, [START + 365 * 86_400 * NS]]), np.r_[True, dwell, True], np.r_[3, stop, 3])
-    return replace(m, status=status, told=("2 messages are of no time of the test",))
+    return replace(m, status=status, told=("2 messages have stamps outside the test",))
 
 
 CASES = (

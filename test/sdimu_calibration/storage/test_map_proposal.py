@@ -82,7 +82,7 @@ def test_two_imus_in_a_file_get_a_map_each(tmp_path, hand):
 
 def test_a_file_without_an_imu_is_refused_with_its_headings(tmp_path):
     path = write(tmp_path / "log.csv", "a,b,c", np.arange(300.0).reshape(100, 3))
-    with pytest.raises(DataError, match=r"not to be told in it \(a, b, c\)"):
+    with pytest.raises(DataError, match=r"not clear which columns .* \(a, b, c\)"):
         propose_maps([path])
 
 

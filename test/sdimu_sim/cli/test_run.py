@@ -77,7 +77,7 @@ def test_the_plan_that_was_run_is_left_with_the_results(tmp_path):
 
 
 @pytest.mark.usefixtures("invoke")
-@pytest.mark.parametrize(("file", "words"), [("metadata.yaml", "of no earlier run"), ("notes.txt", "not a bag")])
+@pytest.mark.parametrize(("file", "words"), [("metadata.yaml", "sdimu run did not make"), ("notes.txt", "not a bag")])
 def test_what_is_in_the_place_of_the_bag_is_kept_and_so_is_the_result(tmp_path, file, words):
     (tmp_path / "run" / "bag").mkdir()
     (tmp_path / "run" / "bag" / file).touch()

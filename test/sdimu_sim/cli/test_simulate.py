@@ -85,7 +85,11 @@ def test_a_truth_replaces_no_other_file_and_a_truth_only_where_asked(run, tmp_pa
     plan = tmp_path / "short.yaml"
     assert run("--rate", "20", "--truth", str(tmp_path / "t.yaml")).exit_code == 0
     (mcap,) = (tmp_path / "bag").glob("*.mcap")
-    for path, words in ((plan, "no truth file"), (mcap, "no truth file"), (tmp_path / "bag", "is a folder")):
+    for path, words in (
+        (plan, "another file than a truth"),
+        (mcap, "another file than a truth"),
+        (tmp_path / "bag", "is a folder"),
+    ):
         before = path.read_bytes() if path.is_file() else b""
         with pytest.raises(DataError, match=words):
             run("--replace", "--truth", str(path))

@@ -48,8 +48,8 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     printed = printing(console, request.pdf)
     if truth is not None and request.estimator == "classical":
         raise typer.BadParameter(
-            "the classical estimator answers in the table's axes, in which no truth is kept: leave it out, or see "
-            "sdimu study mount",
+            "the classical estimator answers in the axes of the table, and no truth is known in them: leave --truth "
+            "out, or see sdimu study mount",
             param_hint="--truth",
         )
     bag = single(bags, request.set_file)

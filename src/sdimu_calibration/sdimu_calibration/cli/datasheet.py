@@ -104,7 +104,7 @@ def _of_unit(entries: tuple[Entry, ...], serial: str | None, certificate: bool) 
     """Take the results of one unit, where one is named or a certificate needs one."""
     units = list(dict.fromkeys(entry.unit for entry in entries))
     if serial is not None and serial not in units:
-        raise DataError(f"--serial {serial}: no result of it (there are: {', '.join(units)})")
+        raise DataError(f"--serial {serial}: no result has this serial number (there are: {', '.join(units)})")
     if certificate and serial is None and len(units) > 1:
-        raise DataError(f"--certificate: is of one unit; choose one with --serial (there are: {', '.join(units)})")
+        raise DataError(f"--certificate: it is of one unit; choose that with --serial (there are: {', '.join(units)})")
     return tuple(entry for entry in entries if serial in {None, entry.unit})

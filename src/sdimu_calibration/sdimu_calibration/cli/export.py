@@ -55,7 +55,7 @@ def export(
         checked_degc("--temperature", temperature)
     calibration, doubts = read_judged_result(result)
     if out is not None and same_file(out, result / "result.json" if result.is_dir() else result):
-        raise DataError(f"--out {out}: is the result that is read; name another file")
+        raise DataError(f"--out {out}: this file is the result itself; name another file to write")
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""

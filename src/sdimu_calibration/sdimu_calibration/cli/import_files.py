@@ -59,7 +59,7 @@ def import_files(
     if each:
         bags = [out / path.stem for path in files]
         if len(set(bags)) < len(bags):
-            raise DataError("import --each: two of the files have one name: import them by themselves")
+            raise DataError("import --each: two files have one name, which both bags would have: import one by one")
         for path, bag in zip(files, bags, strict=True):
             found = read_files([path], described)
             write_imported(bag, found, replace, said)
@@ -110,7 +110,7 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
     for proposal in propose_maps(files):
         path = folder / f"{files[0].stem}{proposal.suffix}_map.yaml"
         if path.exists() and not replace:
-            raise DataError(f"{path}: is there already: import with --map {path}, or propose anew with --replace")
+            raise DataError(f"{path}: the map is there already: use it (--map {path}), or make it anew (--replace)")
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, proposal.text)
         for line in proposal.words:

@@ -50,10 +50,11 @@ def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted)
     handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
     if handheld and wanted == AUTO:
         console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
-    if stated.whole_turns and not handheld:
-        raise DataError("--whole-turns is of runs by hand, and this one is navigated: leave it out, or state --hand")
-    if stated.rests and not handheld:
-        raise DataError("--rests is of runs by hand, and this one is navigated: leave it out, or state --hand")
+    for option, value in (("--whole-turns", stated.whole_turns), ("--rests", stated.rests)):
+        if value and not handheld:
+            raise DataError(
+                f"{option}: only a run by hand takes it, and this one is navigated: leave it out, or state --hand"
+            )
     return test, named_model(request.model, added, handheld=handheld), wanted
 
 

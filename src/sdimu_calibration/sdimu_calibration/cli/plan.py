@@ -304,8 +304,8 @@ def standing_of(console: Console, paths: Sequence[Path], asked: Planned) -> Stan
     results = [p for p in paths if holds_standing(p) or (p / "result.json").is_file() or p.name == "result.json"]
     if results and len(paths) > 1:
         raise DataError(
-            f"--after {results[0]}: results stand alone, as two of them may count a recording twice; name the bags, "
-            "which are then diagnosed together"
+            f"--after {results[0]}: state one result alone, as two of them may count the same recording twice; to use "
+            "several recordings, name their bags"
         )
     if results:
         return read_standing(results[0]) if holds_standing(results[0]) else standing_of_result(results[0], asked.imu)

@@ -63,7 +63,7 @@ class PageOptions:
         stated = {"--port": self.port is not None, "--host": self.host is not None, "--no-browser": self.no_browser}
         idle = [name for name, given in stated.items() if given]
         if idle and not self.live:
-            raise DataError(f"{idle[0]}: there is no page without --open")
+            raise DataError(f"{idle[0]}: only the live page takes it: state --open too, or leave it out")
 
 
 def check_port(host: str, port: int) -> None:

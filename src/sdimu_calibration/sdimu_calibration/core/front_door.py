@@ -35,8 +35,8 @@ from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.wording import Option, Work
 
 ONE_ATTITUDE = (
-    "the IMU is in one attitude all the time: that shows sums of coefficients, and hardly more of each than its file "
-    f"says; turn it between rests ({Work.NOISE} says what one rest tells)"
+    "the IMU is in one attitude all the time: the data show sums of coefficients, and of each one hardly more than the "
+    f"IMU's file says; turn it between rests ({Work.NOISE} says what one rest tells)"
 )
 FEWEST = 100
 """Number of samples below which nothing can be recognised: a second of them."""

@@ -53,8 +53,8 @@ class Reference:
         unit = self.display_unit
         sigma, off, left = (from_si(v, unit) for v in (self.sigma, self.told - self.value, self.value_sigma))
         return (
-            f"{self.words} was estimated along, from +- {sigma:.3g} {unit}: told less true is {off:.3g} +- {left:.3g} "
-            f"{unit}; all sigmas take it in"
+            f"{self.words} was estimated, too, from +- {sigma:.3g} {unit}: what was told is too large by {off:.3g} +- "
+            f"{left:.3g} {unit}; all sigmas take that into account"
         )
 
 

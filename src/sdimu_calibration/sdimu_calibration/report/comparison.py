@@ -82,11 +82,11 @@ def _check_same_data(names: Sequence[str], results: Sequence[Calibration]) -> No
     for name, result in zip(names[1:], results[1:], strict=True):
         if result.body_frame != first.body_frame:
             raise DataError(
-                f"{name}: body frame is {result.body_frame}, of {names[0]} it is {first.body_frame} "
-                "(calibrate both with models of one body_frame)"
+                f"{name}: its body frame is {result.body_frame}, that of {names[0]} is {first.body_frame} "
+                "(calibrate both with models of the same body_frame)"
             )
         if any(_differ(result, first, key) for key in ("samples", "duration_s", "checksum")):
-            raise DataError(f"{name}: is of another recording than {names[0]} (compare models on one recording)")
+            raise DataError(f"{name}: it is of another recording than {names[0]} (compare models of one recording)")
 
 
 def _differ(a: Calibration, b: Calibration, key: str) -> bool:

@@ -400,8 +400,8 @@ def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
         for a in assumed
     ]
     told = (
-        f"{len(rows)} coefficients take for granted that an effect is absent which this test shows weakly or "
-        "not at all: their sigmas hold without it."
+        f"The sigmas of {len(rows)} coefficients hold only if an effect is absent that this test shows weakly or not "
+        "at all."
     )
     table = f"<details><summary>What each takes for granted</summary>{grid(_ASSUMED, rows, {0, 1, 3})}</details>"
     return f"<p>{told}</p>{table}"

@@ -114,7 +114,7 @@ def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) 
             found[places[future]] = future.result()
         except BrokenProcessPool as error:
             raise DataError(
-                "a process of --workers was ended by the system, as where memory is short: take fewer; what is done "
+                "the system ended a process of --workers, usually because memory is short: state fewer; what is done "
                 "stays in the folder evidence of --out"
             ) from error
         if told:

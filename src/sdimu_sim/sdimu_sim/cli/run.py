@@ -168,9 +168,11 @@ def _leave(result: Calibration, goals: str | None, end: dict[str, Any] | None) -
 def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
     """Refuse options that would have no effect."""
     if ask and adaptive is None:
-        raise DataError("--ask: a plan asks nothing; it needs --adaptive GOALS")
+        raise DataError("--ask: only a test that chooses its turns asks: state --adaptive GOALS, too")
     if plan is not None and adaptive is not None:
-        raise DataError(f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses; state one")
+        raise DataError(
+            f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses its turns; state one"
+        )
 
 
 def _clear(out: Path, plan: str = DEFAULT_PLAN, replace: bool = False) -> None:
@@ -183,7 +185,7 @@ def _clear(out: Path, plan: str = DEFAULT_PLAN, replace: bool = False) -> None:
 
     bag, earlier = out / "bag", (out / "log" / "rate_table.yaml").is_file()
     if not earlier and (bag / METADATA).is_file():
-        raise DataError(f"{bag}: is a bag of no earlier run; move it, or name another folder with --out")
+        raise DataError(f"{bag}: sdimu run did not make this bag; move it, or name another folder with --out")
     check_room(bag, replace)
     for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
         (out / stale).unlink(missing_ok=True)

@@ -81,5 +81,5 @@ def test_the_options_are_read_and_refused_in_one_line():
 
 
 def test_an_estimator_that_takes_every_stop_says_so(whole):
-    with pytest.raises(DataError, match="'batch' takes every stop"):
+    with pytest.raises(DataError, match="'batch' cannot leave stops out"):
         solve(whole.without_stops((3,)), load_model("baseline"), "batch")

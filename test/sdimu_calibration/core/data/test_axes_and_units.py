@@ -148,7 +148,7 @@ def test_counts_of_no_unit_are_told_with_the_map_that_reads_them():
     t, w, f = samples("table", 21)
     told = refusal(t, w, f * 41.5)
     # Gravity is the standard one to a part in a thousand, |f| to the errors of the IMU.
-    assert re.search(r"of which 41\.[3-7]\d* are 1 m/s\^2 \(counts_per_unit", told)
+    assert re.search(r"41\.[3-7]\d* of which are 1 m/s\^2 \(counts_per_unit", told)
     assert "--accel-unit" not in told
 
 

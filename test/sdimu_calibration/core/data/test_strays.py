@@ -54,7 +54,7 @@ def test_a_status_of_another_time_is_told_and_costs_no_memory(which, clock_s):
     assert len(found.phase.t) == 121
     assert abs(found.phase.t[0]) < 1.0
     told = " ".join(found.notes)
-    assert "/rate_table/status: 1 messages are of no time of the test" in told
+    assert "/rate_table/status: 1 messages have stamps outside the test" in told
     assert date in told
 
 

@@ -82,7 +82,7 @@ def test_a_prior_that_cannot_be_is_refused_by_name(prepared, prior, word):
 
 def test_an_estimator_that_takes_no_prior_says_so(prepared):
     model = replace(load_model("baseline"), priors=(StatedPrior("gyro_bias_x", 0.0, 0.0, "deg/h"),))
-    with pytest.raises(DataError, match="'batch' takes the priors of the IMU's file alone"):
+    with pytest.raises(DataError, match="'batch' takes priors from the IMU's file only"):
         solve(prepared, model, "batch")
 
 

@@ -101,7 +101,7 @@ def test_a_site_at_its_word_says_what_is_relative_to_it():
     assert gravity.relative == SCALES
     assert gravity.origin == "normal"
     assert latitude.value == latitude.told == SITE.latitude_rad
-    assert not any("estimated along" in note for note in result.notes)
+    assert not any("was estimated, too" in note for note in result.notes)
     line = relative_line(result.references)
     assert "accel_scale_x, accel_scale_y, accel_scale_z to gravity 9.798288 m/s^2 (WGS-84" in line
     assert "\n" not in line
@@ -113,7 +113,7 @@ def test_what_is_found_of_the_site_stands_in_the_result_and_its_file(tmp_path):
     assert abs(latitude.value - SITE.latitude_rad) < 4.0 * latitude.value_sigma < 0.2 * LATITUDE
     assert gravity.value_sigma > 0.5 * GRAVITY
     assert relative_line(result.references) == ""
-    assert sum("was estimated along" in note for note in result.notes) == 2
+    assert sum("was estimated, too" in note for note in result.notes) == 2
     write_result(tmp_path / "result.json", result)
     assert read_result(tmp_path / "result.json").references == result.references
 
@@ -138,7 +138,7 @@ def test_gravity_by_a_latitude_is_as_uncertain_as_that():
 
 def test_the_classical_estimator_says_that_it_takes_the_site_at_its_word():
     test = PreparedTest(recorded()[0], IMU, off(**SIGMAS))
-    with pytest.raises(DataError, match="estimator 'classical' takes the site at its word: leave latitude_sigma out"):
+    with pytest.raises(DataError, match="estimator 'classical' cannot estimate the site: leave latitude_sigma out"):
         solve(test, MODEL, "classical")
 
 

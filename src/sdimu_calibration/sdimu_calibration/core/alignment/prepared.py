@@ -126,7 +126,7 @@ def set_up(site: Site, imu: ImuSpecification, model: Model, epoch_s: float | Non
     body_frame.check_priors([one.name for one in model.priors], sensors.names, model.body_frame)
     for what, noise in (("gyro", imu.gyro_white_noise), ("accel", imu.accel_white_noise)):
         if not noise > 0.0:
-            raise DataError(f"{imu.place}: noise.{what} is zero, and measurements are weighed by it: give it")
+            raise DataError(f"{imu.place}: noise.{what} is zero, and measurements are weighed by it: state its size")
     gravity = site.gravity_m_s2 or float(earth.normal_gravity(site.latitude_rad, site.height_m))
     return TestSetup(site, imu.in_means_over(epoch_s), model, sensors, rest_limits(imu), gravity, epoch_s, counted)
 

@@ -38,7 +38,7 @@ def layout(prepared: PreparedData) -> Layout:
     """Divide the used epochs into stops and blocks of at most `BLOCK_EPOCHS` epochs."""
     used = np.flatnonzero(prepared.phases.used)
     if not len(used):
-        raise DataError("no second of the recording is a whole one at rest: is the unit of the stamps right?")
+        raise DataError("the recording holds no whole second at rest; check the unit of its stamps")
     starts = np.flatnonzero(np.diff(used, prepend=-2) != 1)
     ends = np.append(starts[1:], len(used))
     first, last = prepared.epochs.first, prepared.epochs.last

@@ -190,8 +190,8 @@ def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arran
         same = (omega_ib_b[again] == omega_ib_b[before]).all(axis=1) & (f_ib_b[again] == f_ib_b[before]).all(axis=1)
         if np.count_nonzero(~same) > _WRONG_STAMPS * len(rows):
             raise DataError(
-                f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another reading: stamps "
-                "are no sample times; check header.stamp of the driver"
+                f"{where}: {np.count_nonzero(~same)} of {len(rows)} samples have the stamp of another sample: the "
+                "stamps are not the times of the samples; check header.stamp of the driver"
             )
         notes.append(f"{counted(repeated, 'sample')} repeated a stamp, dropped")
     rows = rows[new]
@@ -246,8 +246,8 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
         back = (newest[first] - ns[first]) * 1e-9 + interval * 1e-9
         raise DataError(
             f"{where}: the clock of the stamps was set back by {back:.3g} s at sample {first} "
-            f"({(ns[first] - ns[0]) * 1e-9:.1f} s after the start), so stamps mean two times; cut the recording there, "
-            "or correct its stamps"
+            f"({(ns[first] - ns[0]) * 1e-9:.1f} s after the start), so one stamp may mean two times; cut the "
+            "recording there, or correct its stamps"
         )
 
 
@@ -329,5 +329,5 @@ def _without_strays(ns: Ints, order: Ints, samples_ns: Ints, topic: str, notes: 
     away = strays(ns[order], samples_ns)
     if away.any():
         first, count = stamp_text(int(ns[order][away][0])), np.count_nonzero(away)
-        notes.append(f"{topic}: {count} messages are of no time of the test (the first is stamped {first}): ignored")
+        notes.append(f"{topic}: {count} messages have stamps outside the test (the first {first}): ignored")
     return order[~away]

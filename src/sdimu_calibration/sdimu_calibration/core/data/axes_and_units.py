@@ -137,8 +137,8 @@ def _accel_unit(f: Floats, stated: Stated) -> tuple[float, tuple[str, ...]]:
         f"{Option.ACCEL_UNIT} {fitting[0]} makes it gravity"
         if fitting
         else (
-            f"no usual unit makes it gravity: raw counts, of which {size / STANDARD_GRAVITY:.4g} are 1 m/s^2 "
-            f"(counts_per_unit in a map of {Work.IMPORT}), or no rest"
+            f"no usual unit makes it gravity: either these are raw counts, {size / STANDARD_GRAVITY:.4g} of which are "
+            f"1 m/s^2 (counts_per_unit in a map of {Work.IMPORT}), or the IMU hardly rests"
         )
     )
     raise DataError(

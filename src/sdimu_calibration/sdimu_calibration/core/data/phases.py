@@ -263,6 +263,6 @@ def contradictions(epochs: Epochs, phases: Phases, log: PhaseLog | None, feels_t
             out.append(DataFault(kind, line, round(seconds), float(t[0]), float(epochs.end[where][-1])))
     if log is not None and len(log.t) and epochs.end[-1] - log.t[-1] > STALE_S:
         begin, end = float(log.t[-1]), float(epochs.end[-1])
-        line = f"the table says nothing from {begin:.1f} to {end:.1f} s, the end: the IMU alone decides on rest"
+        line = f"the status ends at {begin:.1f} s, the recording at {end:.1f} s: between, the IMU alone decides on rest"
         out.append(DataFault("status", line, round(end - begin), begin, end))
     return tuple(out)

@@ -64,7 +64,7 @@ def aligned(recording: Recording) -> Recording:
 def _without_common_time(recording: Recording, log: PhaseLog) -> Recording:
     if log.t[0] < recording.t[-1] and log.t[-1] > 0.0:
         return recording
-    note = "the status has no time in common with the IMU and not its motion: not used"
+    note = "the status has neither the times nor the motion of the IMU: not used"
     return replace(recording, phase=None, notes=(*recording.notes, note))
 
 

@@ -24,7 +24,7 @@ def resolve(text: str) -> Effect:
 def refuse_size(key: EffectKey) -> None:
     """Refuse a key with a size where the size is what is estimated."""
     if key.size:
-        raise DataError(f"effect '{key}': a size is for a simulation; leave '={key.size}' away to estimate it")
+        raise DataError(f"effect '{key}': only a simulation takes a size; leave '={key.size}' out to estimate it")
 
 
 def _find(name: str) -> tuple[Effect, tuple[str, ...]]:

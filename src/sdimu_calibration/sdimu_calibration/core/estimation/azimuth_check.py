@@ -73,7 +73,7 @@ def azimuth_note(solution: Solution[Pass]) -> str | None:
     return (
         f"the azimuth is not observable: at latitude {np.degrees(site.latitude_rad):.4g} deg the horizontal Earth rate "
         f"is {_deg_h(horizontal):.2g} deg/h, and the best gyro bias is known to {_deg_h(bias):.2g} deg/h; "
-        "the coefficients do not need it, headings of this test mean nothing"
+        "the coefficients do not need it, but headings of this test mean nothing"
     )
 
 

@@ -122,23 +122,23 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
         return
     if model.priors:
         raise DataError(
-            f"priors.{model.priors[0].name}: the estimator '{estimator}' takes the priors of the IMU's file alone: "
+            f"priors.{model.priors[0].name}: the estimator '{estimator}' takes priors from the IMU's file only: "
             f"leave them out of the model, or use one of {', '.join(_TAKES_PRIORS)}"
         )
     if estimator == HandheldFit.estimator and test.held_out:
         raise DataError(
-            f"a run by hand has rests and no numbered stops: name their times ({Option.EXCLUDE_TIMES}) instead of stops"
+            f"a run by hand has no numbered stops: state the times to leave out instead ({Option.EXCLUDE_TIMES})"
         )
     if (test.held_out or test.excluded) and estimator != HandheldFit.estimator:
         raise DataError(
-            f"the estimator '{estimator}' takes every stop: cut the recording instead ({Work.CUT}), or use one of "
+            f"the estimator '{estimator}' cannot leave stops out: cut the recording ({Work.CUT}), or use one of "
             f"{', '.join(_TAKES_PRIORS)}"
         )
     site = test.site
     if site is not None and estimator != HandheldFit.estimator and stated_references(site):
         key = "latitude_sigma" if site.latitude_sigma_rad else "gravity_sigma"
         raise DataError(
-            f"the estimator '{estimator}' takes the site at its word: leave {key} out of its file, or use one of "
+            f"the estimator '{estimator}' cannot estimate the site: leave {key} out of its file, or use one of "
             f"{', '.join(_TAKES_PRIORS)}"
         )
 

@@ -159,8 +159,8 @@ def population(fleet: Measured) -> Population:
     units = fleet.units
     if len(units) < FEWEST_UNITS:
         raise DataError(
-            f"fleet: {len(fleet.serials)} results of {len(units)} units that fit together; a population needs "
-            f"{FEWEST_UNITS} units (state who is who with: {Work.CALIBRATE} {Option.SERIAL})"
+            f"fleet: {len(fleet.serials)} results of {len(units)} units fit together; a population needs "
+            f"{FEWEST_UNITS} units (state the unit of each recording: {Work.CALIBRATE} {Option.SERIAL})"
         )
     found = tuple(_coefficient(fleet, k) for k in range(len(fleet.names)))
     return Population(units, found, _out(units, found))

@@ -47,8 +47,8 @@ def check_one_unit(reports: Sequence[Report]) -> None:
         which = f"'{alone[worst].name}' is" if len(alone) > 2 else " and ".join(f"'{r.name}'" for r in alone) + " are"
         other = "another unit than the others" if len(alone) > 2 else "two units"
         raise DataError(
-            f"{which} of {other}, or the axes are mapped otherwise: its coefficients differ as from unit to unit, most "
-            f"{name}, by {told}; calibrate each by itself, or state the {Option.IMU} whose spread is as wide"
+            f"{which} of {other}, or the axes are mapped otherwise: coefficients differ as those of two units do, most "
+            f"{name}, by {told}; calibrate each by itself, or state an {Option.IMU} that allows such a difference"
         )
 
 

@@ -215,7 +215,7 @@ def fit_set(
             break
     if left and len(fit.reports) < 2:
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
-        raise DataError(f"of {len(members)} recordings one can be used, and one is no set ({why})")
+        raise DataError(f"only one of {len(members)} recordings can be used, and a set needs two ({why})")
     late = {name: r for name, r in late.items() if name not in left}
     return replace(_noise_of(late, fit, options, run) if late else fit, left_out=tuple(left.items()))
 

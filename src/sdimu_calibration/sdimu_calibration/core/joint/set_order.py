@@ -54,8 +54,8 @@ def check_one_grade(reports: Sequence[Report]) -> None:
     if len(first) > 1:
         told = ", ".join(f"{r.name}: {r.imu.name}, {grade}" for grade, r in first.items())
         raise DataError(
-            f"the recordings are of IMUs of different grades ({told}): a joint fit is of one unit; state its "
-            f"{Option.IMU} if it is one, else calibrate each by itself"
+            f"the recordings are of IMUs of different grades ({told}), and a joint fit is of one unit: if it is one, "
+            f"state its {Option.IMU}; if not, calibrate each by itself"
         )
 
 
@@ -66,5 +66,5 @@ def check_one_site(reports: Sequence[Report]) -> None:
         first, other = list(sites.values())[:2]
         raise DataError(
             f"{first.name} and {other.name} are at different sites, and latitude_sigma or gravity_sigma is stated: a "
-            "joint fit knows one site that is off; leave the sigmas out of the files, or calibrate each site by itself"
+            "joint fit estimates the error of one site; leave the sigmas out, or calibrate each site by itself"
         )

@@ -176,7 +176,7 @@ def _scatter(t: TurnOn) -> str:
     size, low, high = (f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high))
     return (
         f"{t.effect} differs from power-on to power-on by {size} ({low} to {high}, 95 %) {t.display_unit} in "
-        f"{t.power_ons} power-ons; the value given is the mean over all power-ons that might be"
+        f"{t.power_ons} power-ons; the value given is the mean over all possible power-ons"
     )
 
 

@@ -38,8 +38,8 @@ def register(app: Dash, judge: Judge, doing: TaskProgress) -> None:
         try:
             if setting.priors or setting.held or setting.cut or any("\n" in text for text in setting.added):
                 raise DataError(
-                    "a set takes effects of the catalogue alone: take in what is left out, free what has a prior, take "
-                    "out effects of your own, or judge this recording by itself"
+                    "a set takes the effects of the catalogue only: put back what was left out, remove priors and "
+                    "effects of your own, or judge this recording by itself"
                 )
             found = judge(setting.added, doing.teller(str(page)))
         except (DataError, UnitError) as error:

@@ -39,8 +39,8 @@ class SampleFile:
                 self._count += len(block[0])
         except OSError as error:
             raise DataError(
-                f"{gettempdir()}: no room for the samples of a long recording ({error.strerror or error}); set TMPDIR "
-                "to a folder with 60 bytes a sample"
+                f"{gettempdir()}: no room for the samples of a long recording ({error.strerror or error}); set "
+                "the environment variable TMPDIR to a folder with room for 60 bytes a sample"
             ) from error
 
     def samples(self) -> Samples:

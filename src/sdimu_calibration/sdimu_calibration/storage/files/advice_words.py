@@ -56,7 +56,7 @@ def _unknown(stop: int | None, channel: str, learned: bool) -> str:
     place = "" if stop is None else f", worst at stop {stop} in {channel}"
     if learned:
         return f"Something unknown acts{place}: the sigmas of the result take it in as scatter."
-    return f"Do not use coefficients of this test beyond their scatter: something unknown acts{place}."
+    return f"Something unknown acts{place}: coefficients of this test are no better than their scatter."
 
 
 def _latitude(off: float, sigma: float) -> str:
@@ -102,9 +102,9 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     ),
     Kind.KEEP: lambda label: f"Calibrate with {label or 'what was found'} in the model",
     Kind.TRY: lambda label: (
-        f"Which effect it is stays open, {label} is the likeliest: record more before it is kept; what it changes"
+        f"It is open which effect it is; {label} is the likeliest. Record more before you keep it. What it changes"
         if label
-        else "Of some it stays open which effect it is: record more before they are kept; what they change"
+        else "Of some it is open which effect it is. Record more before you keep them. What they change"
     ),
     Kind.CORRECT_LATITUDE: _latitude,
     Kind.RECORD_AGAIN: lambda label: f"{label} is a fault of this recording: record again and do not carry it over.",
@@ -147,17 +147,17 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "the specific force (sdimu diagnose BAG --try FILE)"
     ),
     Kind.BEGIN_LATER: lambda: (
-        "what comes back at the same time is over when the unit is warm: begin the plan later, or let the first stop "
-        "be longer"
+        "what comes back at the same time ends when the unit is warm: begin the plan later, or make the first stop "
+        "longer"
     ),
     Kind.SOAK_MORE: lambda: (
-        "what comes back at the same temperature is told by soaks: record at more temperatures that stand still"
+        "soaks tell what comes back at the same temperature: record at more temperatures, each held constant"
     ),
     Kind.LOOK_AT_MOUNT: lambda: (
-        "what does not come back is of each run: look at mount, cables and floor, and take it for scatter until then"
+        "what does not come back belongs to each run: check mount, cables and floor; until then count it as scatter"
     ),
     Kind.LOOK_AT_RECORDING: lambda recording, label: (
-        f"look what happened in {recording}, or leave it out of the set: {label}"
+        f"find out what happened in {recording}, which alone shows {label}, or leave it out of the set"
     ),
     Kind.RECORD_A_THIRD: lambda label, one, other: (
         f"record once more: a third recording tells which of {one} and {other} changed ({label})"
@@ -166,7 +166,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"no plan tells {label} from {other}: record at another temperature, or after another warm-up"
     ),
     Kind.RECORD_ONCE_MORE: lambda label, others, turns: (
-        f"to tell {label} from {', '.join(others)}, record once more, rests of 100 s and between them: {turns}; a "
+        f"to tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}; for a "
         "whole plan"
     ),
     Kind.ONE_BY_ONE: lambda: (

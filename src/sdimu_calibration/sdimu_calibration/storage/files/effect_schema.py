@@ -75,7 +75,7 @@ def formulas_of(file: EffectFile) -> dict[str, Expression]:
         formulas[sensor] = _formula(file, sensor, text, known, usual)
     for name in file.parameters:
         if not any(name in formula.names for formula in formulas.values()):
-            raise DataError(f"parameters.{name}: no expression has it")
+            raise DataError(f"parameters.{name}: no expression uses it (use it in one, or leave it out)")
     return formulas
 
 
@@ -95,7 +95,7 @@ def _check_names(file: EffectFile) -> None:
     for group, names in (("parameters", file.parameters), ("constants", file.constants)):
         for name in names:
             if name in VARIABLES or (group == "constants" and name in file.parameters):
-                raise DataError(f"{group}.{name}: that name means something else (choose another)")
+                raise DataError(f"{group}.{name}: this name has a meaning already (choose another)")
 
 
 def constants_of(file: EffectFile) -> dict[str, float]:

@@ -160,7 +160,7 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
     """
     source = find_config("imu", base)
     if same_file(path, source):
-        raise DataError(f"{path}: is the IMU file that the priors are added to; write them to another one")
+        raise DataError(f"{path}: this is the IMU file that the priors are added to; name another file to write")
     first = gathered.entries[0].result
     of = {name: effect_of(name, first.model) for name in first.names}
     units = {of[name]: unit for name, unit in zip(first.names, first.display_units, strict=True)}

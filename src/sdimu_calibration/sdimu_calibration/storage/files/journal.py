@@ -136,7 +136,7 @@ class Journal:
             return tempfile.TemporaryFile("a+b", buffering=0, dir=self._path.parent)
         if self._path.exists() and not self._path.is_file():
             raise DataError(
-                f"{self._path}: no file: the journal of the test stands there; move it, or name another 'out'"
+                f"{self._path}: this is no file, and the journal must be here; move it, or name another folder by 'out'"
             )
         file = self._path.open("a+b", buffering=0)
         try:

@@ -91,7 +91,10 @@ def counted(table: Table, column: int | str, ns: Stamps, rate_hz: float | None) 
     whole = np.isfinite(raw) & (raw == np.rint(raw))
     if len(raw) < 2 or not whole.all():
         row = int(np.argmin(whole))
-        raise DataError(f"{table.path}: {table.line_of(row)}, column {column}: {raw[row]} is no count of a sample")
+        raise DataError(
+            f"{table.path}: {table.line_of(row)}, column {column}: {raw[row]} does not count samples (expected a whole "
+            "number)"
+        )
     count, by = _unwrapped(raw.astype(np.int64))
     if by < 1 or (np.diff(count) < 0).any():
         raise DataError(f"{table.path}: column {column} does not count the samples; check time.counter in the map")

@@ -47,7 +47,7 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     check_file(path)
     if path.suffix.lower() == ".npz":
         raise DataError(
-            f"{path}: a map is proposed for columns in text alone: write one ({_PAGE}) and name it by --map"
+            f"{path}: a map can be proposed for columns in text only: write one ({_PAGE}) and state it with --map"
         )
     table = TextTable(path)
     table.leave_out_broken()
@@ -58,8 +58,8 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     if not pairs:
         shown = ", ".join(table.headings[:12]) or f"{numbers.shape[1]} columns without headings"
         raise DataError(
-            f"{path}: three columns of accelerometers and three of gyros are not to be told in it ({shown}): write a "
-            f"map ({_PAGE}) and name it by --map"
+            f"{path}: it is not clear which columns are the accelerometers and which the gyros ({shown}): write a map "
+            f"({_PAGE}) and state it with --map"
         )
     time = time_of(table, numbers, pairs)
     return [_proposal(path, table, numbers, pair, time, (by, len(pairs))) for pair in pairs]
