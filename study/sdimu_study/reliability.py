@@ -74,13 +74,13 @@ class ReliabilityCase:
 def world(case: ReliabilityCase, seed: int) -> OneTest:
     """Draw plan, site, rate, noise and effects, and simulate the test."""
     rng, imu = rng_of(seed, "reliability", case.imu, case.kind), load_imu(case.imu)
-    by_hand = case.imu == HANDHELD
-    plan = "by hand" if by_hand else str(rng.choice(_TELLING if case.kind == MANY else PLANS))
+    handheld = case.imu == HANDHELD
+    plan = "by hand" if handheld else str(rng.choice(_TELLING if case.kind == MANY else PLANS))
     site, rate_hz, own = drawn_site(rng), float(rng.choice(RATES_HZ)), int(rng.integers(2**31))
-    coloured = not by_hand and (case.kind in {NOISE, ONE} or (case.kind == MIXED and rng.random() < 0.5))
+    coloured = not handheld and (case.kind in {NOISE, ONE} or (case.kind == MIXED and rng.random() < 0.5))
     noise = drawn_noise(imu, str(rng.choice(sorted(NOISES))), rng) if coloured else ()
     true = [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
-    count = _count(case.kind, rng, by_hand)
+    count = _count(case.kind, rng, handheld)
     sizes = _SPAN.get(case.kind, (1.0, 1.0))
     spans = [(float(rng.choice(sizes)),) * 2 if case.kind == ONE else sizes for _ in range(count)]
 
@@ -103,14 +103,14 @@ def _drawn(rng: np.random.Generator, span: tuple[float, float], noise: Sequence[
             return truth
 
 
-def _count(kind: str, rng: np.random.Generator, by_hand: bool) -> int:
+def _count(kind: str, rng: np.random.Generator, handheld: bool) -> int:
     if kind in {CLEAN, NOISE}:
         return 0
     if kind == ONE:
         return 1
     if kind == MANY:
         return int(rng.integers(5, 13))
-    return int(rng.integers(1, _MOST_BY_HAND + 1 if by_hand else 13)) if rng.random() < 0.7 else 0
+    return int(rng.integers(1, _MOST_BY_HAND + 1 if handheld else 13)) if rng.random() < 0.7 else 0
 
 
 def run(world: OneTest) -> tuple[Diagnosis, float]:

@@ -49,7 +49,7 @@ class Kind(StrEnum):
     RANK_TURNS = auto()
     CHOICE_MATTERS = auto()
     """Label; (other, coefficient, sigmas) of what hangs on the choice."""
-    CHOICE_MATTERS_BY_HAND = auto()
+    CHOICE_MATTERS_HANDHELD = auto()
     """Label; other, coefficient, sigmas."""
     SIGNED_TURNS = auto()
     """What all turns are, in words."""

@@ -59,7 +59,7 @@ def held_out_ladder(results: Sequence[Calibration]) -> list[float]:
     results : sequence of Calibration
         The simplest model first.
     """
-    if not all(by_hand(result) for result in results):
+    if not all(is_handheld(result) for result in results):
         return [held_out(result) for result in results]
     scale = np.array([rest.ahead_sigma for rest in results[-1].rests])
     return [
@@ -70,7 +70,7 @@ def held_out_ladder(results: Sequence[Calibration]) -> list[float]:
     ]
 
 
-def by_hand(result: Calibration) -> bool:
+def is_handheld(result: Calibration) -> bool:
     """Whether a result is of a run by hand."""
     return result.estimator == "handheld"
 

@@ -22,13 +22,13 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.arrival import IMU_TOPIC
 from sdimu_calibration.core.data.attitudes import one_attitude
 from sdimu_calibration.core.data.axes_and_units import Stated, recognise
-from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dejitter import dejittered
 from sdimu_calibration.core.data.dwell_detection import with_detected_dwells
 from sdimu_calibration.core.data.imu_class import propose
 from sdimu_calibration.core.data.latitude_check import assumption, contradictions, observe_earth_rate, reversed_force
 from sdimu_calibration.core.data.status_clock import aligned
 from sdimu_calibration.core.data.whole_steps import without_whole_steps
+from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.noise.quantisation import with_quantisation
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification, Site

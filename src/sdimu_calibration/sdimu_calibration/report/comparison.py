@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sdimu_calibration.core.error_figures import (
-    by_hand,
     held_out_judged,
     held_out_ladder,
+    is_handheld,
     log_likelihood,
     nis,
     noise_learned,
@@ -60,7 +60,7 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
 
 def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
     """Say what the columns mean and where they do not compare, one line each."""
-    handheld = [by_hand(result) for result in results]
+    handheld = [is_handheld(result) for result in results]
     return (
         *([_OTHER_STOPS] if any(_differ(result, results[0], "stops") for result in results[1:]) else []),
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),

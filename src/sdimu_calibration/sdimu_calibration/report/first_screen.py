@@ -14,7 +14,7 @@ from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.error_figures import by_hand, held_out, held_out_judged, nis_judged, noise_learned
+from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
@@ -182,7 +182,7 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
     error, squared, learned = held_out(calibration), nis_judged(calibration), noise_learned(calibration)
-    left_out = "recordings" if calibration.of_set else "rests" if by_hand(calibration) else "stops"
+    left_out = "recordings" if calibration.of_set else "rests" if is_handheld(calibration) else "stops"
     out = [_in_noise(held_out_judged(calibration))] if learned else []
     if np.isfinite(error):
         means = _IN_WHITE if learned else "1 is right"

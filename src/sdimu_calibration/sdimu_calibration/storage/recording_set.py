@@ -172,11 +172,11 @@ def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], est
         ``auto`` is that of the file.
     """
     chosen = estimator if estimator != AUTO else wanted.estimator
-    by_hand = chosen == HANDHELD or (chosen == AUTO and _moved_by_hand(wanted.members))
-    return SetOptions(named_model(model or wanted.model, add, handheld=by_hand), chosen, scopes=wanted.scopes)
+    handheld = chosen == HANDHELD or (chosen == AUTO and _first_is_handheld(wanted.members))
+    return SetOptions(named_model(model or wanted.model, add, handheld=handheld), chosen, scopes=wanted.scopes)
 
 
-def _moved_by_hand(members: Sequence[Member]) -> bool:
+def _first_is_handheld(members: Sequence[Member]) -> bool:
     """Whether the first recording that can be opened was moved by hand; fitting tells of those that cannot.
 
     The first is the one that began first, whatever the order in which they are named.

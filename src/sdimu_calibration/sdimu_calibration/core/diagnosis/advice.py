@@ -213,9 +213,9 @@ def _rates(plan: PlanSeen) -> str:
 
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...]:
     """Advise, the most useful first."""
-    out = [*mend(d), *add(found), *together([(one, _more_by_hand(one)) for one in found if others(one)])]
+    out = [*mend(d), *add(found), *together([(one, _more_handheld(one)) for one in found if others(one)])]
     out += [
-        Advice(Kind.CHOICE_MATTERS_BY_HAND, (one.candidate.label, s.other, s.coefficient, s.sigmas))
+        Advice(Kind.CHOICE_MATTERS_HANDHELD, (one.candidate.label, s.other, s.coefficient, s.sigmas))
         for one in found
         if others(one)
         for s in one.coefficient_shifts[:3]
@@ -225,7 +225,7 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...
     return tuple(dict.fromkeys(out))
 
 
-def _more_by_hand(one: Found) -> Advice:
+def _more_handheld(one: Found) -> Advice:
     """Say what to do by hand that would tell a class apart."""
     if Excitation.REPEATED_ATTITUDES in one.candidate.effect.excitation:
         return Advice(Kind.COME_BACK)

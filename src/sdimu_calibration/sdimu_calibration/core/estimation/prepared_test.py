@@ -11,7 +11,7 @@ from typing import Any
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
 from sdimu_calibration.core.alignment.without import without
 from sdimu_calibration.core.data.blocks import let_go
-from sdimu_calibration.core.data.by_hand import why_handheld
+from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, Told, prepare_run
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import Recording

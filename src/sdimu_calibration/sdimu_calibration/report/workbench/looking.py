@@ -91,8 +91,8 @@ def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     )
     def look(candidate: Any, _clicks: Any, kept: Any, own: Any, looked: Any, page: Any) -> tuple[Any, Any, Any]:
         now = from_json(kept)
-        by_hand = dash.ctx.triggered_id == "look-own"
-        text = own if by_hand else candidate
+        typed = dash.ctx.triggered_id == "look-own"
+        text = own if typed else candidate
         if not text:
             # A redrawn figure loses the points that are selected: drawn anew only where a candidate was shown.
             return "Click a bar, or press J.", None if looked else no_update, no_update
@@ -100,7 +100,7 @@ def _look(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
             found = shelf.bench(now.recording).preview(now.now, str(text), doing.teller(str(page)))
         except (DataError, UnitError) as error:
             why = f"Not shown: {' '.join(str(error).split())}"
-            return "Click a bar, or press J.", None, why if by_hand else no_update
+            return "Click a bar, or press J.", None, why if typed else no_update
         return parts.candidate(found, named(str(text))), str(text), ""
 
 

@@ -111,7 +111,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.TELL_APART: _apart,
     Kind.RANK_TURNS: lambda: "Turns ranked by what they tell",
     Kind.CHOICE_MATTERS: _matters,
-    Kind.CHOICE_MATTERS_BY_HAND: lambda label, other, name, sigmas: (
+    Kind.CHOICE_MATTERS_HANDHELD: lambda label, other, name, sigmas: (
         f"Which it is matters: with {other} instead of {label}, {name} moves by {sigmas:+.0f} of its sigmas."
     ),
     Kind.SIGNED_TURNS: lambda seen: (

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.data.attitudes import one_attitude, turned_unseen
-from sdimu_calibration.core.data.by_hand import moved_by_hand, why_handheld
 from sdimu_calibration.core.data.imu_class import propose, shown_at_rest
+from sdimu_calibration.core.data.why_handheld import looks_handheld, why_handheld
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.handheld.handheld import prepare_run
 from sdimu_calibration.core.recording import DataError, PhaseLog, Recording
@@ -43,21 +43,21 @@ def on_table(imu="dtg", brisk=True):
 
 @pytest.mark.parametrize("imu", ["dtg", "fog_tactical", "mems_industrial", "mems_consumer"])
 def test_a_hand_and_a_table_are_told_apart_whatever_the_imu(imu):
-    assert moved_by_hand(by_hand(imu))
-    assert not moved_by_hand(on_table(imu))
-    assert not moved_by_hand(on_table(imu, brisk=False))
+    assert looks_handheld(by_hand(imu))
+    assert not looks_handheld(on_table(imu))
+    assert not looks_handheld(on_table(imu, brisk=False))
 
 
 def test_a_status_that_names_a_dwell_is_of_a_table():
     recording = by_hand()
     said = PhaseLog(np.array([0.0, 3.0]), np.array([True, False]), np.array([0, 0]))
-    assert not moved_by_hand(replace(recording, phase=said))
+    assert not looks_handheld(replace(recording, phase=said))
 
 
 def test_an_imu_that_never_turns_was_not_moved_by_hand():
     recording = by_hand()
     still = replace(recording, omega_ib_b=1e-4 * np.sin(np.arange(3 * len(recording.t)).reshape(-1, 3)))
-    assert not moved_by_hand(still)
+    assert not looks_handheld(still)
 
 
 def test_a_good_imu_in_a_hand_is_not_navigated():

@@ -46,12 +46,12 @@ def why_handheld(recording: Recording, imu: ImuSpecification) -> str:
         if one_attitude(recording):
             return ""
         return "the gyros' white noise in the usual rest hides the Earth's rate"
-    if moved_by_hand(recording):
+    if looks_handheld(recording):
         return "the axis of its turns moves as in a hand, and no table says otherwise"
     return ""
 
 
-def moved_by_hand(recording: Recording) -> bool:
+def looks_handheld(recording: Recording) -> bool:
     """Decide whether a hand turned the IMU.
 
     It did when the axes of the turns move, and no status of a table names a dwell.
