@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+_VERBS = {"cut": "bag cut"}
+"""Verbs that are called otherwise than the work that they do."""
+
 
 def option(name: str) -> str:
     """Return an option of a verb, from the name of its parameter."""
@@ -10,4 +13,4 @@ def option(name: str) -> str:
 
 def work(name: str) -> str:
     """Return the command that starts a work."""
-    return f"sdimu {name}"
+    return f"sdimu {_VERBS.get(name, name)}"

@@ -44,6 +44,11 @@ def test_no_text_of_the_core_holds_a_command_or_an_option_of_the_shell():
     assert not found
 
 
+def test_the_core_names_a_work_and_not_the_way_to_it_in_the_shell():
+    assert all(work.value.isalpha() for work in Work)
+    assert str(Work.CUT) == "sdimu bag cut"
+
+
 def test_every_work_that_a_message_names_is_a_command(verbs):
     assert {str(work) for work in Work} <= set(verbs)
 

@@ -28,7 +28,7 @@ from sdimu_calibration.report import (
     use_section,
 )
 from sdimu_calibration.report.coefficients import as_csv, as_yaml
-from sdimu_calibration.report.markup import prose
+from sdimu_calibration.report.markup import prose, section
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import rows
@@ -73,6 +73,19 @@ def test_the_verdict_stands_first(text, diagnosis):
     (found,) = diagnosis.chosen
     assert body.index(found.effect.title) < body.index("<h2>")
     assert prose(diagnosis.sentence) in body
+
+
+def test_the_contents_name_every_card_of_the_page_in_its_order(text):
+    links = re.findall(r'<li><a href="#([\w-]+)">(.*?)</a>', text)
+    cards = re.findall(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>', text)
+    assert len(cards) > 5
+    assert links == [("verdict", "Verdict"), *((place, words.partition(":")[0]) for place, words in cards)]
+
+
+def test_a_card_tells_its_heading_as_text():
+    card = section("Errors & what they cost", "<p>much</p>")
+    assert card.heading == "Errors & what they cost"
+    assert "<h2>Errors &amp; what they cost</h2>" in card
 
 
 def test_the_page_brings_its_library_once_and_asks_no_network(text):

@@ -60,7 +60,7 @@ class Work(Enum):
     """What a user may start."""
 
     CALIBRATE = "calibrate"
-    CUT = "bag cut"
+    CUT = "cut"
     DIAGNOSE = "diagnose"
     EFFECTS = "effects"
     FLEET = "fleet"

@@ -11,10 +11,29 @@ Draw = Callable[[Any], str]
 """Makes a part of the page of a figure."""
 
 
-def section(heading: str, *parts: str) -> str:
+class Card(str):
+    """A section of a page as HTML, of which a table of contents asks what it is called.
+
+    Attributes
+    ----------
+    heading : str
+        As text, not as HTML.
+    """
+
+    heading: str
+
+    def __new__(cls, html: str, heading: str) -> Card:
+        """Take the HTML of a section under its heading."""
+        made = super().__new__(cls, html)
+        made.heading = heading
+        return made
+
+
+def section(heading: str, *parts: str) -> Card:
     """Return a card: a heading with what belongs to it, and an anchor made of the heading."""
     body = "\n".join(part for part in parts if part)
-    return f'<section class="card" id="{anchor(heading)}"><h2>{escape(heading)}</h2>\n{body}</section>'
+    html = f'<section class="card" id="{anchor(heading)}"><h2>{escape(heading)}</h2>\n{body}</section>'
+    return Card(html, heading)
 
 
 def switched(figure: str, words: Sequence[str]) -> str:

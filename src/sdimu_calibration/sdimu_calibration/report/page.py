@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -24,7 +23,7 @@ from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.markup import Draw, grid, prose, quiet, section
+from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section
 from sdimu_calibration.report.odds_section import odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
@@ -35,8 +34,6 @@ from sdimu_calibration.report.unknown_section import unknown_of, unknown_section
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
-
-_HEADING = re.compile(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>')
 
 
 @dataclass(frozen=True)
@@ -131,12 +128,12 @@ def page(calibration: Calibration, contents: Contents) -> str:
         traceability(calibration, contents.trace),
     ]
     body = "\n".join(part for part in parts if part)
-    headings = [("verdict", "Verdict"), *_HEADING.findall(body)]
+    headings = ["Verdict", *(part.heading for part in parts if isinstance(part, Card))]
     return document(
         contents.title,
         body,
         under=_under(calibration),
-        contents=[(anchor, words.partition(":")[0]) for anchor, words in headings],
+        contents=[(anchor(heading), heading.partition(":")[0]) for heading in headings],
         script=experiment.ATTITUDE_SCRIPT if fit is not None else "",
     )
 
