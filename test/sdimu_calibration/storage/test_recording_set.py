@@ -18,6 +18,7 @@ import pytest
 from sdimu_calibration.core.joint.member import run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.note import Note, Topic, topic_of, without_advice
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.model_choice import named_model
@@ -119,10 +120,14 @@ def test_other_bytes_are_another_job(bags, tmp_path):
 def test_a_report_is_read_back(bags, tmp_path):
     report = run(job_of(set_of([bags / "run1"], LIKE).members[0], OPTIONS, None))
     site = replace(report.site, latitude_sigma_rad=1e-3, magnetic_field_t=(2e-5, 0.0, 4e-5))
-    report = replace(report, site=site)
+    # Words that nobody has written before: what a note is about is not told by them.
+    said = (Note("it wanders", Topic.DIFFERS, "; look"), Note("it is one", Topic.INSEPARABLE), "a line")
+    report = replace(report, site=site, warnings=said)
     write_report(tmp_path / "one", report, "7")
     back = read_report(tmp_path / "one", "7")
     assert back is not None
+    assert [topic_of(line) for line in back.warnings] == [Topic.DIFFERS, Topic.INSEPARABLE, None]
+    assert without_advice(back.warnings) == ("it wanders", "it is one", "a line")
     for name in ("A", "y", "point", "weight"):
         np.testing.assert_array_equal(getattr(back.reduction, name), getattr(report.reduction, name))
     # Every field that a report gets is in its file, but for what the member of the set says.

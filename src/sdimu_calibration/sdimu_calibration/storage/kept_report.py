@@ -12,7 +12,7 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.joint.member import Report
-from sdimu_calibration.storage.files.result_file import as_note
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.storage.files.whole_file import beside
 
-REPORT_FORMAT = "sdimu-reduction/4"
+REPORT_FORMAT = "sdimu-reduction/5"
 """What a recording says: a line, then an NPZ file of plain arrays; no code is loaded from it."""
 SUFFIX = ".reduction"
 LONGEST = 1 << 28
@@ -92,11 +92,13 @@ def _report(words: dict[str, Any], arrays: dict[str, Any]) -> Report | None:
     found = report.reduction
     if found.A.shape != (len(found.y), len(found.names) + len(found.labels)):
         return None
-    return replace(report, warnings=tuple(map(as_note, report.warnings)))
+    return report
 
 
 def _plain(value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
     """Give a dataclass, and what is in it, as plain data; an array goes to `arrays`, its key is left in its place."""
+    if isinstance(value, Note):
+        return {"bare": value.bare, "topic": value.topic, "end": value.removeprefix(value.bare)}
     if is_dataclass(value):
         return {each.name: _plain(getattr(value, each.name), arrays) for each in fields(value)}
     if isinstance(value, np.ndarray):
@@ -117,6 +119,8 @@ def _built(hint: Any, value: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
     if is_dataclass(hint):
         hints = get_type_hints(hint)
         return hint(**{name: _built(hints[name], entry, arrays) for name, entry in value.items()})  # type: ignore[operator]
+    if hint is str and isinstance(value, dict):
+        return Note(value["bare"], value["topic"] and Topic(value["topic"]), value["end"])
     if get_origin(hint) is np.ndarray:
         return arrays[value]
     if get_origin(hint) is tuple:
