@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from sdimu_calibration.core.joint.member import Job
+from sdimu_calibration.core.effects.body_frame import FRAMES, TRIAD_NAMES, read_in_axes
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.set_fit import fit_set
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.files.config import load_model
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_sim.core.scenario import Scenario, generate
+from sdimu_sim.core.truth import draw_coefficients, in_body_frame
 
-from .conftest import here, short, unit_set
+from .conftest import SITE, InMemory, here, short, unit_set
+
+AS_GIVEN = np.eye(3)
+TURNED = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Axes x, y, z of a recording are y, -x, z of the unit."""
 
 
 @pytest.fixture(scope="module")
@@ -49,3 +58,67 @@ def test_a_set_is_refused_before_physics_is_sought(options):
     own, other = unit_set(31, [short()] * 2).members, unit_set(32, [short()]).members
     with pytest.raises(DataError, match="'strange' is of another unit"):
         fit_set((*own, replace(other[0], name="strange")), options, here)
+
+
+def in_axes(member: Member, axes=TURNED) -> Member:
+    """Return a recording whose samples are in turned axes."""
+    test = member.open()
+    r = test.recording
+    turned = replace(r, omega_ib_b=r.omega_ib_b @ axes.T, f_ib_b=r.f_ib_b @ axes.T)
+    return replace(member, name="strange", open=InMemory(PreparedTest(turned, test.imu, test.site)))
+
+
+def test_turned_axes_are_named(reports):
+    strange = here([Job(in_axes(unit_set(31, [short()] * 3).members[2]), load_model("baseline"))])[0]
+    with pytest.raises(DataError, match="'strange' are turned against the others: its x, y, z are y, -x, z of the"):
+        check_one_unit([reports[0], strange, reports[1]])
+    with pytest.raises(DataError, match=r"axes of '(strange|r0)' are turned against '(r0|strange)'"):
+        check_one_unit([reports[0], strange])
+
+
+def test_a_difference_that_no_exchange_of_axes_makes_is_that_of_another_unit(reports):
+    """What axes do not turn here, the mass unbalance, may be all that differs."""
+    values = reports[2].values.copy()
+    values[[k for k, name in enumerate(reports[2].names) if "mass_unbalance" in name]] *= -9.0
+    with pytest.raises(DataError, match="'r2' is of another unit than the others"):
+        check_one_unit([*reports[:2], replace(reports[2], values=values)])
+
+
+def as_calibrated(like: Report, imu: str, unit: int, recording: int, axes=AS_GIVEN) -> Report:
+    """Report of a unit of an IMU file whose heading stays open: its truth with errors of a hundredth of the priors."""
+    spec = load_imu(imu)
+    true = in_body_frame(draw_coefficients(spec, unit), FRAMES[0])
+    values = np.array([true[name] for name in like.names])
+    prior = np.array([spec.prior[name.rpartition("_")[0]] for name in like.names])
+    places = [like.names.index(name) for name in TRIAD_NAMES]
+    values[places] = read_in_axes(TRIAD_NAMES, values[places], np.zeros(len(places)), axes.T)[0]
+    sigma = np.where(like.sigma > 0.0, 0.01 * prior, 0.0)
+    values += sigma * np.random.default_rng((unit, recording)).standard_normal(len(values))
+    weight = dict(zip(like.names, prior**-2.0, strict=True))
+    rows = replace(like.reduction, weight=np.array([weight[name] for name in like.reduction.names]))
+    return replace(like, name=f"r{recording}", reduction=rows, values=values, sigma=sigma, heading_rad=0.1)
+
+
+@pytest.mark.parametrize("imu", ["mems_consumer", "mems_industrial", "fog_tactical"])
+@pytest.mark.parametrize("unit", range(51, 61))
+def test_recordings_whose_heading_stays_open_are_compared_too(reports, imu, unit):
+    own = [as_calibrated(reports[0], imu, unit, k) for k in range(3)]
+    check_one_unit(own)
+    with pytest.raises(DataError, match="'r3' is of another unit than the others"):
+        check_one_unit([*own, as_calibrated(reports[0], imu, unit + 500, 3)])
+    with pytest.raises(DataError, match="'r3' are turned against the others: its x, y, z are y, -x, z of the others"):
+        check_one_unit([*own, as_calibrated(reports[0], imu, unit, 3, TURNED)])
+
+
+def test_a_set_of_a_cheap_imu_is_refused_before_physics_is_sought(options):
+    """Nothing but its heading is open in each of these recordings, and no wide prior hides another unit."""
+    imu = load_imu("mems_industrial")
+    plan = load_plan("kim18")
+    turns = tuple(replace(turn, rate_rad_s=np.radians(4.0)) for turn in plan.turns[:7])
+    unit = Scenario(replace(plan, dwell_s=(15.0,) * 8, turns=turns), imu, SITE, rate_hz=10.0, seed=61)
+    tests = [
+        PreparedTest(generate(replace(unit, seed=seed, start_ns=seed * 10**15))[0], imu, SITE) for seed in (61, 62)
+    ]
+    members = [Member(f"r{k}", InMemory(test)) for k, test in enumerate(tests)]
+    with pytest.raises(DataError, match="'r0' and 'r1' are of two units"):
+        fit_set(members, options, here)

@@ -296,14 +296,14 @@ class Turns:
         )
 
     def _other_axes(self, share: float) -> tuple[float, float, Floats]:
-        found = ((self.misfit(r, P, share), r, P) for r in self.C for P in _ROTATIONS)
+        found = ((self.misfit(r, P, share), r, P) for r in self.C for P in ROTATIONS)
         return min(found, key=lambda entry: entry[0])
 
 
 def _wrong_axes(axes: Floats) -> str:
     return (
         "the turns contradict the axes: the gyros fit the accelerometers only when their axes are read as "
-        f"({_named(axes)}); correct the driver, or import the data with the right signs"
+        f"({axes_in_words(axes)}); correct the driver, or import the data with the right signs"
     )
 
 
@@ -359,8 +359,15 @@ def _signed_permutations() -> tuple[Floats, ...]:
     return tuple(out)
 
 
-_ROTATIONS = _signed_permutations()
+ROTATIONS = _signed_permutations()
+"""The 24 rotations that exchange axes, shape (3, 3) each."""
 
 
-def _named(P: Floats) -> str:
+def axes_in_words(P: Floats) -> str:
+    """Name the axes that the rows of a signed permutation pick, such as ``y, -x, z``.
+
+    Parameters
+    ----------
+    P : ndarray, shape (3, 3)
+    """
     return ", ".join(f"{'-' if row[k] < 0 else ''}{'xyz'[k]}" for row in P for k in np.flatnonzero(row))

@@ -61,6 +61,8 @@ def _unbalance_places(power: str = "") -> dict[str, tuple[int, int, float]]:
 
 
 _TRIADS = (partial(_places, "accel"), partial(_places, "gyro"))
+TRIAD_NAMES = tuple(name for triad in _TRIADS for name in triad())
+"""Coefficients that an exchange of axes turns into each other: scale factors and misalignments of both triads."""
 
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
@@ -310,6 +312,38 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
     if pinned_in(names, frame):
         J[[list(names).index(name) for name in pinned_in(names, frame)]] = 0.0  # by definition; rounding leaves 1e-11
     return J
+
+
+def read_in_axes(names: Sequence[str], values: Floats, sigma: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """Scale factors and misalignments of a unit as they are once its axes are read as those of others.
+
+    Error matrices M of both triads become ``P' M P``; then the frame is that of the accelerometers again.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        `TRIAD_NAMES`, in any order.
+    values, sigma : ndarray, shape (p,)
+        In the accelerometers' frame (SI). Correlations are taken for zero.
+    axes : ndarray, shape (3, 3)
+        Signed permutation P: row i has the axis of the others that is axis i of the unit.
+
+    Returns
+    -------
+    values, sigma : ndarray, shape (p,)
+        SI; sigmas of pinned coefficients are zero.
+    """
+
+    def read(rows: Floats) -> Floats:
+        out = rows.copy()
+        for triad in _TRIADS:
+            places = triad()
+            _read_back(axes.T @ _matrix(places, names, rows) @ axes, places, names, out)
+        return values_in_frame(names, out, FRAMES[0])
+
+    J = _differences(read, values)
+    J[[list(names).index(name) for name in pinned_in(names)]] = 0.0
+    return read(np.asarray(values, dtype=float)), np.sqrt(J**2 @ np.asarray(sigma) ** 2)
 
 
 def _levi_civita(row: int, column: int, k: int) -> float:

@@ -5,25 +5,35 @@ to recording. With d the difference of a recording from the others and v the var
 that it is another unit are
 
     sum of log N(d; 0, v + 2 s^2) - log N(d; 0, v + 2 (share s)^2)
+
+One unit whose axes were exchanged differs so, too. Read in the right one of the 23 other orders and senses of its axes
+it is the same unit. That it is turned has, against that it is one unit as it is, the log odds from above less those of
+the scale factors and misalignments as read, less log 23.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.axes_and_units import ROTATIONS, axes_in_words
+from sdimu_calibration.core.effects.body_frame import TRIAD_NAMES, read_in_axes
 from sdimu_calibration.core.effects.registry import get, names
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.core.wording import Option
+from sdimu_calibration.core.wording import Option, Work
 
 SHARE = 0.3
 """What one unit differs by from recording to recording at most (share of the size that the IMU file gives): three times
 the repeatability of data sheets, which is a tenth and less."""
 _ODDS = 7.0
-"""Log odds (1) from which a recording is refused as of another unit: a thousand to one."""
+"""Log odds (1) from which a recording is refused: a thousand to one."""
+_NAMED = 3.0
+"""Log odds (1) against another unit from which turned axes are named: twenty to one."""
 _APART_K = 10.0
 """Difference of mean temperatures (K) from which nothing is said: a coefficient then changes as from unit to unit."""
 
@@ -34,22 +44,60 @@ def check_one_unit(reports: Sequence[Report]) -> None:
     Parameters
     ----------
     reports : sequence of Report
-        Of the recordings' own fits; those that do not stand alone are left out.
+        Of the recordings' own fits. A heading that stays open, or a prior that was widened, makes a fit no place about
+        which a set is linear; its coefficients and sigmas are good enough here.
     """
-    alone = [r for r in reports if r.stands_alone]
-    heat = [r.temperature_degc for r in alone if r.has_temperature]
-    if len(alone) < 2 or (heat and max(heat) - min(heat) > _APART_K):
+    own = [r for r in reports if len(r.values)]
+    heat = [r.temperature_degc for r in own if r.has_temperature]
+    if len(own) < 2 or (heat and max(heat) - min(heat) > _APART_K):
         return
-    odds = [_log_odds(r, [o for o in alone if o is not r]) for r in alone]
+    odds = [_log_odds(r, [o for o in own if o is not r]) for r in own]
     worst = int(np.argmax([total for total, _, _ in odds]))
     total, name, told = odds[worst]
-    if total > _ODDS:
-        which = f"'{alone[worst].name}' is" if len(alone) > 2 else " and ".join(f"'{r.name}'" for r in alone) + " are"
-        other = "another unit than the others" if len(alone) > 2 else "two units"
+    strange, others = own[worst], [o for o in own if o is not own[worst]]
+    axes, turned = _turned_axes(strange, others)
+    if max(total, total + turned) <= _ODDS:
+        return
+    whose = "the others" if len(others) > 1 else f"'{others[0].name}'"
+    if turned > _NAMED:
         raise DataError(
-            f"{which} of {other}, or the axes are mapped otherwise: coefficients differ as those of two units do, most "
-            f"{name}, by {told}; calibrate each by itself, or state an {Option.IMU} that allows such a difference"
+            f"the axes of '{strange.name}' are turned against {whose}: its x, y, z are {axes_in_words(axes)} of "
+            f"{whose}; correct the driver, or import the data with the same axes (columns and sign in a map of "
+            f"{Work.IMPORT})"
         )
+    which = f"'{strange.name}' is" if len(own) > 2 else " and ".join(f"'{r.name}'" for r in own) + " are"
+    other = "another unit than the others" if len(own) > 2 else "two units"
+    raise DataError(
+        f"{which} of {other}, or the axes are mapped otherwise: coefficients differ as those of two units do, most "
+        f"{name}, by {told}; calibrate each by itself, or state an {Option.IMU} that allows such a difference"
+    )
+
+
+def _turned_axes(report: Report, others: Sequence[Report]) -> tuple[Floats, float]:
+    """Find how the axes of a recording are turned, if they are: in which axes it is most like the others.
+
+    Returns
+    -------
+    axes : ndarray, shape (3, 3)
+        Signed permutation; its rows pick the axes of the others.
+    odds : float
+        Log odds (1) that it is turned against that it is of another unit; minus infinity where a recording lacks
+        coefficients that turn, or nothing is more like the others than the axes as they are.
+    """
+    as_given = np.eye(3)
+    if not all(set(TRIAD_NAMES) <= set(r.names) for r in (report, *others)):
+        return as_given, -np.inf
+    same = [_read_in(other, as_given) for other in others]
+    odds = [_log_odds(_read_in(report, axes), same)[0] for axes in ROTATIONS]
+    best = ROTATIONS[int(np.argmin(odds))]
+    return best, -np.inf if np.array_equal(best, as_given) else -min(odds) - float(np.log(len(ROTATIONS) - 1))
+
+
+def _read_in(report: Report, axes: Floats) -> Report:
+    """Return what a report says of scale factors and misalignments, read in other axes."""
+    places = [report.names.index(name) for name in TRIAD_NAMES]
+    values, sigma = read_in_axes(TRIAD_NAMES, report.values[places], report.sigma[places], axes)
+    return replace(report, names=TRIAD_NAMES, values=values, sigma=sigma)
 
 
 def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str]:
