@@ -23,7 +23,7 @@ ARGUMENTS = (
     ("temperature_topic", "imu/temperature", "temperature of your IMU, if there is one"),
     ("imu", "", "data sheet of the IMU: name in config/imu or path; learned from the rests when empty"),
     ("site", "", "place of the test: name in config/site or path"),
-    ("model", "baseline", "model to estimate: name in config/model or path"),
+    ("model", "", "model to estimate: name in config/model or path; baseline (by hand: hand) when empty"),
     ("accel_unit", "", "unit of the specific force in the messages; recognised when empty"),
     ("gyro_unit", "", "unit of the body rate in the messages; recognised when empty"),
     ("accel_sign", "0", "sign of the specific force in the messages, 1 or -1; 0 recognises it"),

@@ -19,7 +19,7 @@ ARGUMENTS = (
     ("speed", "0.0", "times real time; 0: as fast as the calibration follows"),
     ("imu", "", "data sheet of the IMU: name in config/imu or path; learned from the rests when empty"),
     ("site", "", "place of the test: name in config/site or path"),
-    ("model", "baseline", "model to estimate: name in config/model or path"),
+    ("model", "", "model to estimate: name in config/model or path; baseline (by hand: hand) when empty"),
     ("out", "out/replay", "folder of result.json, diagnosis.json and report.html"),
 )
 

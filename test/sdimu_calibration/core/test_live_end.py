@@ -8,13 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.estimation.outcome import calibrate, outcome
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import UNNUMBERED, DataError
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.model_choice import by_hand, named_model
 from sdimu_calibration.storage.opening import Source, open_test, opening_options
+from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 from sdimu_sim.core.scenario import Scenario, generate
 
 G = 9.80665
@@ -160,7 +163,7 @@ def recorded(path, m):
 def live(m, imu, site="daejeon"):
     """A live calibration that has taken all messages in blocks of 20, and its estimates on the way."""
     options = opening_options(site, load_imu(imu), m.source if site else Source())
-    found = LiveCalibration(options, load_model("baseline"))
+    found = LiveCalibration(options, named_model(None, []), named_model(None, [], handheld=True))
     estimates, entry, said = [], 0, [] if m.status is None else list(zip(*(c.tolist() for c in m.status), strict=True))
     for k in range(0, len(m.ns), 20):
         rows = slice(k, k + 20)
@@ -229,6 +232,20 @@ def test_live_end_and_bag_give_the_same_coefficients(imu, cases, tmp_path):
     assert len(estimates) > 0.95 * (m.ns[-1] - START) / NS
     if other_clock not in cases:
         assert sum(e.used for e in estimates) > 0.5 * sum(SHORT.dwell_s)
+
+
+def test_the_end_of_a_run_by_hand_has_the_model_of_a_run_by_hand(tmp_path):
+    """On the way nobody knows yet what it is; the end takes the model that the bag is estimated with."""
+    r = by_hand_recording(ByHand(12, load_imu("mems_by_hand"), load_site("daejeon"), seed=72))[0]
+    none = np.empty(0, dtype=np.int64)
+    m = Messages(START + np.rint(r.t * NS).astype(np.int64), r.omega_ib_b, r.f_ib_b, None, (none, none))
+    ended = live(m, "mems_by_hand")[0].finish()
+    test = open_test(recorded(tmp_path / "bag", m), "daejeon", load_imu("mems_by_hand"), m.source)
+    offline = outcome(solve(test, named_model(None, [], by_hand(test))))
+    assert ended.estimator == "handheld"
+    assert ended.model == offline.model
+    np.testing.assert_array_equal(ended.values, offline.values)
+    np.testing.assert_array_equal(ended.covariance, offline.covariance)
 
 
 def test_an_assumed_site_that_the_data_exclude_is_refused_live_and_offline(tmp_path):

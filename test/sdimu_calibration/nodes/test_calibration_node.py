@@ -36,7 +36,7 @@ def setting(*effects):
 def test_an_effect_that_fits_is_taken_as_it_was_checked():
     answer, node = setting("gyro_scale_asymmetry_y")
     assert answer.successful
-    assert "gyro_scale_asymmetry_y" in [getattr(effect, "key", effect) for effect in node._checked.effects]
+    assert "gyro_scale_asymmetry_y" in [getattr(effect, "key", effect) for effect in node._checked[0].effects]
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.arrays import raw_test
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.effect_file import find_effects
-from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
+from sdimu_calibration.storage.files.model_choice import by_hand, named_estimator, named_model
 from sdimu_calibration.storage.opening import Opening, Source
 from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
 
@@ -187,8 +187,8 @@ def calibrate(
     if isinstance(test, OpenedSet):
         return test.fit(set_options(test.core, model, _listed(add), wanted), progress)
     _expect("calibrate", "test", test, PreparedTest, "what open(...) or open_set(...) returns")
-    handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
-    return CalibrationFit(solve(test, named_model(model, _listed(add), handheld), wanted, progress=progress))
+    chosen = named_model(model, _listed(add), by_hand(test, wanted))
+    return CalibrationFit(solve(test, chosen, wanted, progress=progress))
 
 
 @overload

@@ -38,7 +38,7 @@ def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted)
     """
     from sdimu_calibration.core.estimation.solve import AUTO
     from sdimu_calibration.storage.files.effect_file import find_effects
-    from sdimu_calibration.storage.files.model_choice import HANDHELD, named_model
+    from sdimu_calibration.storage.files.model_choice import by_hand, named_model
 
     wanted, added = request.asked_estimator, request.add or []
     # A wrong name is reported before a long recording is read; which model it is added to, the recording may decide.
@@ -47,7 +47,7 @@ def opened(console: Console, bag: Path, opening: StatedOpening, request: Fitted)
     for text in added:
         find_effects(text)
     test = stated.test(bag)
-    handheld = wanted == HANDHELD or (wanted == AUTO and bool(test.why_handheld))
+    handheld = by_hand(test, wanted)
     if handheld and wanted == AUTO:
         console.print(HANDHELD_CHOSEN.format(why=test.why_handheld), soft_wrap=True)
     for option, value in (("--whole-turns", stated.whole_turns), ("--rests", stated.rests)):

@@ -30,6 +30,9 @@ BagsArgument = Annotated[
 ]
 FoldersArgument = Annotated[list[Path], typer.Argument(metavar="FOLDER ...", help="Every result.json below is taken.")]
 ModelOption = Annotated[str, typer.Option(help="Model to estimate: name in config/model or path.")]
+ChosenModelOption = Annotated[
+    str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
+]
 ImuNameOption = Annotated[str, typer.Option(help="Specification of the IMU: name in config/imu or path.")]
 DomainOption = Annotated[
     int | None,
@@ -224,9 +227,7 @@ class StatedOpening(Reading, Stated):
 class Fitted:
     """What is fitted, and how."""
 
-    model: Annotated[
-        str | None, typer.Option(help="Model to estimate: name in config/model or path; baseline (handheld: hand).")
-    ] = None
+    model: ChosenModelOption = None
     estimator: Annotated[
         str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
     ] = "auto"

@@ -11,7 +11,14 @@ import typer
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import default_folder, leave
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagArgument, DomainOption, EachStopOption, ModelOption, Recorded, results_in
+from sdimu_calibration.cli.options import (
+    BagArgument,
+    ChosenModelOption,
+    DomainOption,
+    EachStopOption,
+    Recorded,
+    results_in,
+)
 from sdimu_calibration.core.data_error import DataError
 
 
@@ -19,7 +26,7 @@ from sdimu_calibration.core.data_error import DataError
 class Playing:
     """How a recording is played into the node."""
 
-    model: ModelOption = "baseline"
+    model: ChosenModelOption = None
     speed: Annotated[
         float, typer.Option(min=0.0, max=1e6, help="Times real time; 0 is as fast as the calibration allows.")
     ] = 0.0
@@ -53,7 +60,7 @@ def replay(bag: BagArgument, playing: Playing, opening: Recorded) -> None:
     calibrating = {
         "site": opening.site or "",
         "imu": opening.imu or "",
-        "model": playing.model,
+        "model": playing.model or "",
         "out": str(folder),
         "accel_unit": opening.accel_unit or "",
         "gyro_unit": opening.gyro_unit or "",

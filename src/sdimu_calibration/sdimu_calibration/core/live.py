@@ -16,6 +16,7 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import RawTest, in_order
+from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
@@ -105,10 +106,13 @@ class LiveCalibration:
     ----------
     options : OpeningOptions
         IMU, site, and what the user states of units and signs.
+    by_hand : Model, optional
+        Of the end, where that finds a run by hand; else it is `model`, too.
     """
 
-    def __init__(self, options: OpeningOptions, model: Model) -> None:
+    def __init__(self, options: OpeningOptions, model: Model, by_hand: Model | None = None) -> None:
         self.options = options
+        self._by_hand = by_hand or model
         self._model = live_model(options, model)
         self.setup = self._model.setup
         self.notes = self._model.notes
@@ -252,7 +256,8 @@ class LiveCalibration:
     def finish(self) -> Calibration:
         """Calibrate on everything taken so far; what a calibration of the recording says of the same data."""
         test = self.opened()
-        return calibrate(test.recording, test.site, test.imu, self.setup.model)
+        model = self._by_hand if why_handheld(test.recording, test.imu) else self.setup.model
+        return calibrate(test.recording, test.site, test.imu, model)
 
     def opened(self) -> OpenedTest:
         """Everything taken so far, opened as a recording is."""

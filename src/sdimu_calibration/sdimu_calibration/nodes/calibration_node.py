@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -58,8 +59,8 @@ from sdimu_calibration.report.live_text import model_name
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 from sdimu_calibration.storage.files.config import load_model
-from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import Journal, digest
+from sdimu_calibration.storage.files.model_choice import model_word, named_model
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 
@@ -75,6 +76,7 @@ DIAGNOSIS_S = 120.0
 REPORT_S = 900.0
 """Time (s) after the result for which its files are awaited: the diagnosis is made twice, the second time in full."""
 GRAVITY = 9.8
+_MODEL = "model to estimate: name in config/model or path; empty: baseline (handheld: hand)"
 _NEARLY_NS = 1_000
 """A status this much before the last sample is the one that belongs to it (ns)."""
 
@@ -87,15 +89,17 @@ class CalibrationNode:
         self.done = Future()
         declare = Declare(self.node)
         self._options, self._topics = declare_opening(self.node)
-        self._base = model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
+        self._base = model = declare.text(
+            "model", "", "model to estimate: name in config/model or path; empty: baseline (handheld: hand)"
+        )
         added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files", live=True))
-        self._model = self._checked = extended_model(model, added)
+        self._models = self._checked = _models(model, added)
         self._out = Path(declare.text("out", ".", "folder of result.json and of the journal"))
         self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
-        _warm_up(self._options, self._model)
+        _warm_up(self._options, self._models[0])
         # The text of an effect file too: its name says little of what it computes.
         texts = [Path(file[0]).read_text() for text in added if (file := parse_key(text).file)]
-        options = digest(self._options, load_model(model), added, texts)
+        options = digest(self._options, load_model(model_word(model, handheld=False)), added, texts)
         checkpoint = declare.flag("checkpoint", True, "keep a journal with which a successor goes on")
         self._frames = declare_frames(declare)
         beat_s = declare.number("heartbeat_s", 1.0, "wall time between heartbeats (s); 0: none", least=0.0)
@@ -155,16 +159,16 @@ class CalibrationNode:
         self.node.get_logger().info(f"goes on after {count} s from {self._out / JOURNAL}")
 
     def _make(self) -> LiveCalibration:
-        return LiveCalibration(self._options, self._model)
+        return LiveCalibration(self._options, *self._models)
 
     def _check_added(self, parameters: list[Parameter]) -> SetParametersResult:
         """Refuse effects that cannot be added, with the line that the command line says."""
         try:
             for parameter in parameters:
                 if parameter.name == "add":
-                    model = extended_model(self._base, _effects(parameter))
-                    LiveCalibration(self._options, model)
-                    self._checked = model
+                    models = _models(self._base, _effects(parameter))
+                    LiveCalibration(self._options, *models)
+                    self._checked = models
         except Exception as error:
             # Whatever is asked, the test goes on.
             what = str(error) if isinstance(error, DataError) else f"add: {type(error).__name__}: {error}"
@@ -177,7 +181,7 @@ class CalibrationNode:
             if parameter.name == "add":
                 added = _effects(parameter)
                 # As it was checked: its files may have changed since.
-                self._model = self._checked
+                self._models = self._checked
                 self._feed.begin_again()
                 self._diagnosing.change_model(added)
                 self.node.get_logger().info(f"model {model_name(added)}: the filter begins again from the journal")
@@ -240,7 +244,7 @@ class CalibrationNode:
         self._first = self._first or sigmas
         if e.used:
             units = dict(zip(e.names, e.display_units, strict=True))
-            effects = [effect if isinstance(effect, str) else effect.key for effect in self._model.effects]
+            effects = [effect if isinstance(effect, str) else effect.key for effect in self._models[0].effects]
             words = sigma_words(falling(self._first, sigmas, units, effects))
             self._last = f"stop {e.stop} after {e.t:.0f} s; {words}; {light(e.stop_nis, e.verdict)}"
         elif self._last and not e.dwell:
@@ -335,6 +339,11 @@ class CalibrationNode:
 def _effects(parameter: Parameter) -> tuple[str, ...]:
     """Effects that the parameter `add` names."""
     return tuple(str(effect) for effect in parameter.value or () if effect)
+
+
+def _models(word: str, added: Sequence[str]) -> tuple[Model, Model]:
+    """Read the model of the filter on the way, and that of the end where it finds a run by hand."""
+    return named_model(word, added), named_model(word, added, handheld=True)
 
 
 def _warm_up(options: OpeningOptions, model: Model) -> None:

@@ -21,11 +21,12 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
+from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.live_report import leave_report
 from sdimu_calibration.report.live_picture import live_picture
-from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.journal import read_journal
+from sdimu_calibration.storage.files.model_choice import by_hand, model_word, named_model
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
 """A further question of a fit: `WorkerSetup.question`."""
@@ -42,7 +43,7 @@ class WorkerSetup:
     journal : Path
         As `Journal.place`.
     model : str
-        Name or path.
+        Name or path; empty takes the one for a table, or for a run by hand.
     question : callable, optional
         Function of a module that is asked of every fit, as ``question(fit, diagnosis, about)``; its answer must survive
         `pickle`.
@@ -145,9 +146,7 @@ class Diagnoser:
         try:
             test = self._opened(request.until_ns)
             earlier = [self._error(test, models) for models in request.models[:-1]]
-            found, fit = so_far(
-                test, extended_model(self._setup.model, added), added, earlier, request.until_ns is None
-            )
+            found, fit = so_far(test, self._model(test, added), added, earlier, request.until_ns is None)
             self._errors[added] = found.ladder[-1]
             if self._setup.question is not None:
                 more = self._setup.question(fit, found, request.about)
@@ -163,16 +162,19 @@ class Diagnoser:
         if self._setup.report is None:
             return ""
         try:
-            name = " + ".join((self._setup.model, *added))
-            leave_report(self._setup.report, test, extended_model(self._setup.model, added), name)
+            name = " + ".join((model_word(self._setup.model, by_hand(test)), *added))
+            leave_report(self._setup.report, test, self._model(test, added), name)
         except (DataError, OSError) as error:
             return str(error)
         return ""
 
     def _error(self, test: PreparedTest, added: tuple[str, ...]) -> ModelError:
         if added not in self._errors:
-            self._errors[added] = error_of(test, extended_model(self._setup.model, added), added)
+            self._errors[added] = error_of(test, self._model(test, added), added)
         return self._errors[added]
+
+    def _model(self, test: PreparedTest, added: tuple[str, ...]) -> Model:
+        return named_model(self._setup.model, added, by_hand(test))
 
     def _opened(self, until_ns: int | None) -> PreparedTest:
         """Open the data up to a stamp, unless they are those of the last request; everything is read anew."""

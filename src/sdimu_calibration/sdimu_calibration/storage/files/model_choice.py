@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
@@ -25,17 +26,27 @@ def named_estimator(word: str, option: str = "estimator") -> str:
     return name
 
 
+def by_hand(test: PreparedTest, estimator: str = AUTO) -> bool:
+    """Whether a test is estimated as a run by hand: as asked for, or as its data say."""
+    return estimator == HANDHELD or (estimator == AUTO and bool(test.why_handheld))
+
+
+def model_word(word: str | None, handheld: bool) -> str:
+    """Return the name or path of a model that `word` means; parameters as for `named_model`."""
+    default = HANDHELD_MODEL if handheld else TABLE_MODEL
+    return _MODEL_ALIASES.get(word, word) if word else default
+
+
 def named_model(word: str | None, added: Sequence[str], handheld: bool = False) -> Model:
     """Read the model that `word` means, with effects added; ``handheld`` means ``hand``.
 
     Parameters
     ----------
     word : str or None
-        Name in config/model or path; None takes the model for a table, or for a handheld run.
+        Name in config/model or path; None or empty takes the model for a table, or for a handheld run.
     added : sequence of str
         Effects to add.
     handheld : bool
         Moved by hand.
     """
-    default = HANDHELD_MODEL if handheld else TABLE_MODEL
-    return extended_model(default if word is None else _MODEL_ALIASES.get(word, word), added)
+    return extended_model(model_word(word, handheld), added)
