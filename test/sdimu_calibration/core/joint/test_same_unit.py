@@ -84,6 +84,17 @@ def test_a_difference_that_no_exchange_of_axes_makes_is_that_of_another_unit(rep
         check_one_unit([*reports[:2], replace(reports[2], values=values)])
 
 
+def test_coefficients_whose_spread_the_imu_file_does_not_state_say_nothing(reports):
+    """Units that have nothing of an effect agree in it, and are no more one unit for that."""
+    stated = {name: size for name, size in reports[0].imu.prior.items() if "unbalance" not in name}
+    bare = [replace(r, imu=replace(r.imu, prior=stated)) for r in reports]
+    with pytest.raises(DataError, match=r"'strange' is of another unit.*most (gyro|accel)_(scale|misalignment)"):
+        check_one_unit(bare)
+    values = bare[2].values.copy()
+    values[[k for k, name in enumerate(bare[2].names) if "mass_unbalance" in name]] *= -9.0
+    check_one_unit([*bare[:2], replace(bare[2], values=values)])
+
+
 def as_calibrated(like: Report, imu: str, unit: int, recording: int, axes=AS_GIVEN) -> Report:
     """Report of a unit of an IMU file whose heading stays open: its truth with errors of a hundredth of the priors."""
     spec = load_imu(imu)

@@ -1,6 +1,6 @@
 """Are the recordings of a set those of one unit? Scale factors, misalignments and the like stay with a unit.
 
-Two units differ in them by what the IMU file allows, s of each coefficient; one unit by a fraction of it from recording
+Two units differ in them by what the IMU file states, s of each coefficient; one unit by a fraction of it from recording
 to recording. With d the difference of a recording from the others and v the variance of d by the noise, the log odds
 that it is another unit are
 
@@ -103,7 +103,9 @@ def _read_in(report: Report, axes: Floats) -> Report:
 def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str]:
     """Log odds that a recording is of another unit than others; the coefficient that says most, and its difference."""
     spread = dict(zip(report.reduction.names, report.reduction.weight.tolist(), strict=True))
-    stable = {p.name: p.display_unit for e in map(get, names()) if e.scope == "unit" for p in e.parameters}
+    # What a grade may have says little of how its units differ: many have nothing of it, and then agree in it.
+    effects = [e for e in map(get, names()) if e.scope == "unit" and (e.family or e.name) in report.imu.prior]
+    stable = {p.name: p.display_unit for e in effects for p in e.parameters}
     total, most, name, told = 0.0, -np.inf, "", ""
     for place, coefficient in enumerate(report.names):
         known = [(o.values[i], o.sigma[i]) for o in others for i in _places(o, coefficient) if o.sigma[i] > 0.0]
