@@ -28,6 +28,9 @@ LONG = {
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py": (
         "test_no_physics_is_named_for_what_moves_within_stretches",
     ),
+    "test/sdimu_calibration/core/joint/test_changed.py": (
+        "test_scale_factors_of_the_accelerometers_that_differ_alike_are_those_of_another_site",
+    ),
     "test/sdimu_calibration/core/joint/test_function_fit.py": (
         "test_it_changes_next_to_nothing_where_nothing_is_left",
         "test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_attitudes",

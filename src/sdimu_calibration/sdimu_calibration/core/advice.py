@@ -75,6 +75,8 @@ class Kind(StrEnum):
     LOOK_AT_MOUNT = auto()
     LOOK_AT_RECORDING = auto()
     """Recording; label of what it alone shows."""
+    LOOK_AT_SITE = auto()
+    """Recording; by what all its accelerometers' scale factors differ, with its sigma and unit."""
     RECORD_A_THIRD = auto()
     """Label of the coefficient that changed; the two recordings."""
     NO_PLAN_TELLS = auto()

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.advice import Kind
-from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_diagnosis import SetFinding, diagnose_set, sites_to_check
 from sdimu_calibration.core.joint.set_evidence import set_evidence
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.files.advice_words import sentence
 
 from .conftest import here, short, unit_set
 
@@ -30,6 +32,28 @@ def test_a_coefficient_that_changed_is_told_as_such_and_not_as_physics_that_look
     place = others.names.index(name)
     sigma = float(np.sqrt(others.covariance[place, place]))
     assert found.after.values[found.after.names.index(name)] == pytest.approx(others.values[place], abs=sigma)
+
+
+def test_scale_factors_of_the_accelerometers_that_differ_alike_are_those_of_another_site(options):
+    shift = {f"accel_scale_{axis}": 100e-6 for axis in "xyz"}
+    found = diagnose_set(unit_set(37, [short()] * 3, shift={2: shift}).members, options, here)
+    assert {(f.label, f.recording) for f in found.findings} == {(name, "r2") for name in shift}
+    assert found.verdict == Verdict.DATA_FAULT
+    assert sentence(found.advice[0]).startswith("check the site of r2: ")
+
+
+def changed(axis: str, ppm: float, recording: str = "r2") -> SetFinding:
+    label = f"accel_scale_{axis}"
+    return SetFinding(label, "", recording, ppm * 1e-6, 5e-6, 20.0, "1", "ppm", ())
+
+
+def test_a_site_is_to_be_checked_where_all_three_differ_alike():
+    x, y, z = changed("x", 105.0), changed("y", 95.0), changed("z", 100.0)
+    (told,) = sites_to_check([x, y, changed("x", 9.0, "r1"), z])
+    assert (told.kind, told.about) == (Kind.LOOK_AT_SITE, ())
+    assert told.arguments == ("r2", "100.0 +- 2.9 ppm")
+    assert sites_to_check([x, y]) == []
+    assert sites_to_check([x, y, changed("z", 60.0)]) == []
 
 
 @pytest.mark.parametrize("which", [0, 1])

@@ -57,6 +57,9 @@ GRAVITY = register(
     )
 )
 
+SEEN_AS_GRAVITY = ACCEL_SCALE.labels
+"""Coefficients that a wrong gravity changes all alike."""
+
 DEFLECTION_EAST = register(
     Effect(
         name="reference_deflection_east",

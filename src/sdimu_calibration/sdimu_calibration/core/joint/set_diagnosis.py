@@ -12,6 +12,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, size
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
@@ -30,6 +31,7 @@ from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
+from sdimu_calibration.core.probability import chi2_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -379,13 +381,29 @@ def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
+def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:
+    """Advise to check the site of a recording in which the accelerometers' scale factors changed all alike."""
+    out = []
+    for recording in dict.fromkeys(f.recording for f in findings if f.recording and is_change(f.label)):
+        own = [f for f in findings if f.recording == recording and f.label in SEEN_AS_GRAVITY]
+        weight = np.array([f.sigma for f in own]) ** -2.0
+        values = np.array([f.value for f in own])
+        if len(own) < len(SEEN_AS_GRAVITY):
+            continue
+        mean = float(np.average(values, weights=weight))
+        if chi2_tail(float(weight @ (values - mean) ** 2), len(own) - 1.0) > SCATTERS:
+            share = size(mean, float(np.sum(weight)) ** -0.5, own[0].display_unit)
+            out.append(Advice(Kind.LOOK_AT_SITE, (recording, share)))
+    return out
+
+
 def _advice(
     word: Verdict,
     findings: Sequence[SetFinding],
     closing: Sequence[tuple[tuple[str, ...], NextTurn]],
     steps: Sequence[Advice],
 ) -> tuple[Advice, ...]:
-    out = [*steps]
+    out = [*steps, *sites_to_check(findings)]
     closed = {members[0] for members, _ in closing}
     for f in findings:
         if f.against:

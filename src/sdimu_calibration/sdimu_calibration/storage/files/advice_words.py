@@ -159,6 +159,10 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.LOOK_AT_RECORDING: lambda recording, label: (
         f"find out what happened in {recording}, which alone shows {label}, or leave it out of the set"
     ),
+    Kind.LOOK_AT_SITE: lambda recording, share: (
+        f"check the site of {recording}: the scale factors of its three accelerometers differ alike, by {share}, as "
+        "gravity at another latitude or height makes them"
+    ),
     Kind.RECORD_A_THIRD: lambda label, one, other: (
         f"record once more: a third recording tells which of {one} and {other} changed ({label})"
     ),
