@@ -10,7 +10,8 @@ from typing import Any
 import yaml
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.files.whole_file import write_whole
+from sdimu_calibration.storage.bags.file_room import check_no_source
+from sdimu_calibration.storage.files.whole_file import same_file, write_whole
 from sdimu_sim.core.true_coefficients import true_coefficients
 from sdimu_sim.core.truth import Truth
 
@@ -77,8 +78,11 @@ def check_truth_room(path: Path, bag: Path, replace: bool) -> None:
     replace : bool
         What is there may be replaced.
     """
-    if path.is_dir() or path == bag:
-        raise DataError(f"{path}: is a folder; name a file for --truth")
+    if same_file(path, bag):
+        raise DataError(f"{path}: is a folder; name a file with --truth")
+    if any(same_file(folder, bag) for folder in path.resolve().parents):
+        raise DataError(f"{path}: stands in the bag that is made; name a file outside it with --truth")
+    check_no_source(path, "--truth")
     if not os.path.lexists(path):
         return
     if not _is_truth(path):

@@ -57,6 +57,18 @@ def test_a_mended_bag_is_whole_for_other_readers_and_the_cut_file_is_kept(bag):
         assert reader.message_count == sum(salvage.counts.values()) == sum(1 for _ in reader.messages())
 
 
+def test_a_bag_that_is_cut_twice_keeps_both_cut_files(bag):
+    file = next(bag.glob("*.mcap"))
+    cuts = []
+    for _ in range(2):
+        cuts.append(file.read_bytes()[: int(file.stat().st_size * 0.9)])
+        file.write_bytes(cuts[-1])
+        (salvage,) = recover(bag)
+        assert salvage.kept is not None
+        assert salvage.kept.read_bytes() == cuts[-1]
+    assert {path.read_bytes() for path in bag.glob("*.damaged*")} == set(cuts)
+
+
 def test_mending_keeps_the_numbers(tmp_path, small_test):
     written = type(small_test)(20_000)
     bag = written.write(tmp_path / "long")

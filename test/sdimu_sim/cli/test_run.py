@@ -12,6 +12,7 @@ from sdimu_calibration.cli.processes import own_domain, own_folder
 from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_plan
+from sdimu_calibration.storage.files.journal import JOURNAL
 from sdimu_sim.cli.run import LiveTest, _clear, _tell_choices, _write_plan, run, without_scolding
 
 
@@ -103,6 +104,25 @@ def test_a_run_into_the_folder_of_an_earlier_one_asks_for_replace(tmp_path):
     assert (tmp_path / "result.json").exists()
     _clear(tmp_path, replace=True)
     assert not (tmp_path / "result.json").exists()
+
+
+@pytest.mark.parametrize("name", ["plan.yaml", "truth.yaml"])
+def test_a_run_leaves_files_of_the_user_in_a_folder_of_no_earlier_run(tmp_path, name):
+    (tmp_path / name).write_text("# by hand\n")
+    with pytest.raises(DataError, match=f"{name}: is there already"):
+        _clear(tmp_path)
+    assert (tmp_path / name).read_text() == "# by hand\n"
+
+
+def test_a_run_keeps_the_journal_of_a_live_test_and_removes_that_of_an_earlier_run(tmp_path):
+    (tmp_path / JOURNAL).write_text("samples")
+    _clear(tmp_path)
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["samples"]
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "rate_table.yaml").touch()
+    (tmp_path / JOURNAL).touch()
+    _clear(tmp_path)
+    assert not (tmp_path / JOURNAL).exists()
 
 
 def test_turns_that_the_test_chose_itself_are_not_scolded():

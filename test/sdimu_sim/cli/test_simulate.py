@@ -87,7 +87,7 @@ def test_a_truth_replaces_no_other_file_and_a_truth_only_where_asked(run, tmp_pa
     (mcap,) = (tmp_path / "bag").glob("*.mcap")
     for path, words in (
         (plan, "another file than a truth"),
-        (mcap, "another file than a truth"),
+        (mcap, "stands in the bag"),
         (tmp_path / "bag", "is a folder"),
     ):
         before = path.read_bytes() if path.is_file() else b""

@@ -60,7 +60,6 @@ def cut(
 @app.command()
 def recover(bag: BagArgument) -> None:
     """Mend a bag that was cut while it was being written; the cut file stays as NAME.damaged."""
-    from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
     from sdimu_calibration.storage.bags.recover import recover as mend
 
     console = plain()
@@ -70,5 +69,5 @@ def recover(bag: BagArgument) -> None:
         state = f"mended, was cut ({salvage.damage})" if salvage.damage else "whole, left as it is"
         console.print(f"{salvage.path}: {state}", soft_wrap=True)
         console.print(f"  {seconds:.1f} s: {saved}", soft_wrap=True)
-        if salvage.damage:
-            console.print(f"  the cut file is now {salvage.path.name}{DAMAGED_SUFFIX}", soft_wrap=True)
+        if salvage.kept is not None:
+            console.print(f"  the cut file is now {salvage.kept.name}", soft_wrap=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
-from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, spelled
+from sdimu_calibration.cli.next_commands import PLAN, PLAN_SHOWN, Asked, as_plan, check_plan_room, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
@@ -76,6 +76,8 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         refuse_for_sets(opening, bootstrap=request.bootstrap, grow=request.grow)
         diagnose_together(SetRequest(bags or [], opening, request), extra)
         return
+    folder = request.out or default_folder(bag, "diagnosis")
+    check_plan_room(folder)
     test, wanted, chosen = opened(console, bag, opening, request)
     if request.bootstrap and chosen == "auto" and test.why_handheld:
         raise DataError(NO_BOOTSTRAP)
@@ -86,7 +88,6 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         progress("navigation without aid", 0.97)
         more = report_extras(found, fit)
     summary = summarise(found)
-    folder = request.out or default_folder(bag, "diagnosis")
     about = Asked.of((bag,), folder, opening, request)
     print_summary(console, summary, about, more)
     null = None
@@ -136,7 +137,7 @@ def _write(what: Findings, trace: Trace) -> None:
         write_diagnosis(part / "diagnosis.json", summary, what.null)
         write_result(part / "result.json", found.after, found.verdict)
         if (plan := as_plan(summary.plan)) is not None:
-            write_plan(part / PLAN, plan, ["The plan as the motion showed it, for: sdimu plan --plan"])
+            write_plan(part / PLAN, plan, [f"{PLAN_SHOWN}, for: sdimu plan --plan"])
         write_report(
             part / "report.html",
             found.after,

@@ -11,7 +11,6 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.opened import warn
 from sdimu_calibration.cli.options import OwnEffectOption, checked_degc
 from sdimu_calibration.core.data_error import DataError
-from sdimu_calibration.storage.files.whole_file import same_file
 
 _MOST_HZ = 1e6
 """Highest sample rate (Hz): no IMU sends faster."""
@@ -39,14 +38,19 @@ def export(
         float | None, typer.Option(metavar="DEGC", help="Temperature at which matrices and biases are stated.")
     ] = None,
     effect: OwnEffectOption = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace a file that is already there.")] = False,
 ) -> None:
     """Write a result for another program: matrices, files of Kalibr, OpenVINS, GTSAM, imu_tk, PX4, C, YAML or CSV.
 
     A result that is not to be trusted is written all the same; stderr says why it is not.
     """
+    from functools import partial
+
+    from sdimu_calibration.storage.bags.file_room import check_file_room
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
-    from sdimu_calibration.storage.files.effect_file import effects_of_result
+    from sdimu_calibration.storage.files.config import find_config
+    from sdimu_calibration.storage.files.effect_file import effect_files, effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
     if not 0.0 < rate <= _MOST_HZ:
@@ -54,13 +58,14 @@ def export(
     if temperature is not None:
         checked_degc("--temperature", temperature)
     calibration, doubts = read_judged_result(result)
-    if out is not None and same_file(out, result / "result.json" if result.is_dir() else result):
-        raise DataError(f"--out {out}: this file is the result itself; name another file to write")
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
     name = FORMS[form].file_name if form in FORMS else ""
     specification, whose = noise_for(calibration, imu)
-    done = write(form, out or folder / name, calibration, specification, own, rate, temperature)
+    sources = [folder / "result.json" if result.is_dir() else result, *effect_files(effect or [])]
+    sources += [find_config("imu", imu)] if imu else []
+    free = partial(check_file_room, option="--out", replace=replace, sources=sources)
+    done = write(form, out or folder / name, calibration, specification, own, rate, temperature, free)
     console = plain()
     for text in done.missing:
         console.print(f"not in the file: {text}", soft_wrap=True, markup=False, highlight=False)

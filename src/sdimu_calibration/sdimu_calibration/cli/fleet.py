@@ -22,16 +22,23 @@ def fleet(
         str | None, typer.Option(help="IMU whose noise and grade go into --priors; that of the results by default.")
     ] = None,
     out: Annotated[Path | None, results_in("pages; FOLDER")] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace a file that is already in the place of --priors.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare all units of a type: mean and spread, who is out, what is common; leaves fleet.json and fleet.html."""
     from sdimu_calibration.core.fleet.study import study
     from sdimu_calibration.report.fleet import tables
     from sdimu_calibration.report.fleet.page import display_units, headline, write_page
+    from sdimu_calibration.storage.bags.file_room import check_file_room
     from sdimu_calibration.storage.files.fleet_file import write_fleet, write_priors
     from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
 
     console = plain(stderr=as_json)
+    if priors is not None:
+        read = [path for folder in folders for path in ([folder] if folder.is_file() else folder.rglob("*.json"))]
+        check_file_room(priors, "--priors", replace=replace, sources=read)
     gathered = gather(folders)
     for line in gathered.apart:
         say(console, f"set apart: {line}")

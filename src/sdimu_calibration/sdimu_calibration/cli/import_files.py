@@ -93,9 +93,7 @@ def _set_of(console: Console, folder: Path, bags: Sequence[Path], replace: bool)
     from sdimu_calibration.storage.recording_set import write_set
 
     path = folder / "set.yaml"
-    if replace:
-        path.unlink(missing_ok=True)
-    write_set(path, bags)
+    write_set(path, bags, replace=replace)
     say(console, f"{path}: {len(bags)} recordings; to calibrate them together:")
     command(console, f"sdimu calibrate --set {path}")
 
@@ -104,6 +102,7 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
     """Write maps that probably fit, and say how to go on."""
     import shlex
 
+    from sdimu_calibration.storage.bags.file_room import check_no_source
     from sdimu_calibration.storage.importing.map_proposal import propose_maps
 
     folder = Path() if out is None else out.parent
@@ -111,7 +110,7 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
         path = folder / f"{files[0].stem}{proposal.suffix}_map.yaml"
         if path.exists() and not replace:
             raise DataError(f"{path}: the map is there already: use it (--map {path}), or make it anew (--replace)")
-        path.parent.mkdir(parents=True, exist_ok=True)
+        check_no_source(path, "--out", files)
         write_whole(path, proposal.text)
         for line in proposal.words:
             say(console, f"note: {line}")

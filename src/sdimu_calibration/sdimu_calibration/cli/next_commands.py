@@ -23,10 +23,19 @@ if TYPE_CHECKING:
 
 PLAN = "plan.yaml"
 """File beside a diagnosis: the plan as the motion showed it."""
+PLAN_SHOWN, PLAN_RUN, PLAN_CHOSEN = "The plan as the motion showed it", "The plan that was run", "The turns chosen for"
+"""How the remark begins at the head of a plan that a verb leaves with its results: a new one may replace it."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 _FIRST = ("site", "imu", "model", "noise", "estimator")
 """Options that a command names first; the others stand as their groups have them."""
+
+
+def check_plan_room(folder: Path) -> None:
+    """Raise DataError where the plan beside the results would replace a file of the user."""
+    from sdimu_calibration.storage.bags.file_room import check_own_file
+
+    check_own_file(folder / PLAN, tuple(f"# {head}" for head in (PLAN_SHOWN, PLAN_RUN, PLAN_CHOSEN)))
 
 
 @dataclass(frozen=True)

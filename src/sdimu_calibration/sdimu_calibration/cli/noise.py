@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.recording import Recording
     from sdimu_calibration.core.specification import Site
 
+MEASURED = "Noise measured in"
+"""How the remark begins at the head of imu.yaml: such a file may be replaced by a new one."""
+
 
 @with_options
 def noise(
@@ -39,14 +42,16 @@ def noise(
     from sdimu_calibration.core.noise import rests, white_noise
     from sdimu_calibration.report.noise import HEAD, misfits, write_page
     from sdimu_calibration.report.noise import rows as listed
+    from sdimu_calibration.storage.bags.file_room import check_own_file
     from sdimu_calibration.storage.files.config import find_config, load_site
     from sdimu_calibration.storage.files.imu_file import write_measured_imu
     from sdimu_calibration.storage.files.noise_terms_file import write_noise_terms
     from sdimu_calibration.storage.opening import open_recording
 
     # Errors in files are reported before the work.
-    if opening.imu is not None:
-        find_config("imu", opening.imu)
+    folder = out or default_folder(bag, "noise")
+    stated = [] if opening.imu is None else [find_config("imu", opening.imu)]
+    check_own_file(folder / "imu.yaml", (f"# {MEASURED}",), stated)
     site = None if opening.site is None else load_site(opening.site)
     recording = open_recording(bag, opening.source)
     imu = opening.imu or grade_of(recording)
@@ -64,12 +69,11 @@ def noise(
         *([] if site is None else [gravity_note(recording, rows, site)]),
         *recording.notes,
     ]
-    folder = out or default_folder(bag, "noise")
     place = [] if opening.site is None else ["--site", opening.site]
     with written_together(folder) as part:
         write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms)
         write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
-        write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"Noise measured in {bag.name}: {words[0]}"])
+        write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"{MEASURED} {bag.name}: {words[0]}"])
     print_table(console, HEAD, listed(terms), "terms of the Allan deviation, one sigma", left=2)
     for word in words:
         say(console, f"note: {word}")

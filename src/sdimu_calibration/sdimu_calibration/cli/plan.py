@@ -114,6 +114,7 @@ class PlanRequest:
         bool, typer.Option("--backwards", help="Write --plan in the opposite order, and search no plan.")
     ] = False
     out: Annotated[Path, typer.Option(help="Plan file to write.")] = Path("out/plan/found.yaml")
+    replace: Annotated[bool, typer.Option("--replace", help="Replace a plan file that is already there.")] = False
     as_json: JsonOption = False
 
 
@@ -129,18 +130,21 @@ def plan(
 ) -> None:
     """Search for a plan with the bound of the data; leaves a plan file for --plan."""
     from sdimu_calibration.core.plan_search import Question
+    from sdimu_calibration.storage.bags.file_room import check_file_room
     from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
     from sdimu_calibration.storage.files.model_choice import named_model
 
     console = plain(stderr=request.as_json)
     start = load_plan(planned.plan)
+    paths = [*(request.after or []), *(more or [])]
+    if not request.tell:
+        check_file_room(request.out, "--out", replace=request.replace, sources=_sources(planned, paths))
     if request.backwards:
         _write_backwards(console, start, request.out)
         answer({"plan": str(request.out), "minutes": start.duration_s / 60.0}, request.as_json)
         return
     if more and not request.after:
         raise typer.BadParameter("recordings stand behind --after", param_hint="BAG")
-    paths = [*(request.after or []), *(more or [])]
     before = standing_of(console, paths, planned) if request.after else None
     imu = planned.imu or (before and before.imu) or "dtg"
     site = planned.site or (before and before.site) or "daejeon"
@@ -151,6 +155,18 @@ def plan(
         _tell(console, asked, request.tell, allowed, request.as_json)
     else:
         _search(console, asked, allowed, request)
+
+
+def _sources(planned: Planned, after: Sequence[Path]) -> list[Path]:
+    """List what is read: files of the configuration, recordings, and results in their folders."""
+    from sdimu_calibration.storage.files.config import find_config
+    from sdimu_calibration.storage.files.effect_file import effect_files
+    from sdimu_calibration.storage.recording_set import is_bag
+
+    stated = {"plan": planned.plan, "imu": planned.imu, "site": planned.site, "model": planned.model}
+    files = [find_config(kind, name) for kind, name in stated.items() if name is not None]
+    known = [file for path in after for file in ([path] if is_bag(path) else [path, *path.glob("*.json")])]
+    return files + effect_files(planned.add or []) + [path for path in known if is_bag(path) or path.is_file()]
 
 
 @dataclass(frozen=True)

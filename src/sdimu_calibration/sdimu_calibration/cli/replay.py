@@ -46,14 +46,19 @@ def replay(bag: BagArgument, playing: Playing, opening: Recorded) -> None:
 
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.bags.bag_file import bag_parts
+    from sdimu_calibration.storage.files.journal import JOURNAL
     from sdimu_calibration.storage.files.result_file import read_result
+    from sdimu_calibration.storage.files.whole_file import put_aside
     from sdimu_calibration.storage.opening import opening_options
 
     # Errors of bag or options are reported before anything is started.
     bag_parts(bag)
     opening_options(opening.site, opening.specification, opening.source)
     folder = playing.out or default_folder(bag, "replay")
-    for old in ("result.json", "calibration.journal"):
+    if not (folder / "log" / "replay.yaml").is_file():
+        # The journal of a live test in that folder may be all that there is of it.
+        put_aside(folder / JOURNAL)
+    for old in ("result.json", JOURNAL):
         (folder / old).unlink(missing_ok=True)
     console = plain()
     begun = time.monotonic()

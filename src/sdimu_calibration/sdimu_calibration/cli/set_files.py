@@ -32,6 +32,7 @@ def init(
     power_on: Annotated[
         str | None, typer.Option(metavar="NAME", help="Switch-on that all recordings share: they share their biases.")
     ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace a set file that is already there.")] = False,
 ) -> None:
     """Write a first set file of bags, or of the bags in folders."""
     from sdimu_calibration.storage.recording_set import Said, bags_of, is_bag, write_set
@@ -39,7 +40,7 @@ def init(
     found = bags_of(places)
     first = places[0].resolve()
     path = out or (first.parent if is_bag(first) else first) / "set.yaml"
-    write_set(path, found, Said(serial or "", power_on or ""))
+    write_set(path, found, Said(serial or "", power_on or ""), replace=replace)
     missing = " and ".join(word for word, said in (("serial", serial), ("power_on", power_on)) if said is None)
     then = f"complete {missing}, then" if missing else "now"
     plain().print(f"{path}: {len(found)} recordings; {then}: sdimu calibrate --set {path}", soft_wrap=True)

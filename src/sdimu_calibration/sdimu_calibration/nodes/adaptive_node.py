@@ -26,7 +26,6 @@ from sdimu_calibration.core.adaptive.question import Decision, Situation, next_m
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
-from sdimu_calibration.nodes.calibration_node import JOURNAL
 from sdimu_calibration.nodes.credits import HISTORY, NS, header
 from sdimu_calibration.nodes.diagnosis_worker import Answer, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.driving import PATIENCE_S, Driving
@@ -36,6 +35,7 @@ from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.table_driver import Arrival
 from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_calibration.storage.files.journal import JOURNAL
 from sdimu_calibration.storage.files.json_file import write_json
 from sdimu_calibration.storage.files.whole_file import put_aside
 

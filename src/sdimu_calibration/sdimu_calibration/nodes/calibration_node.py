@@ -37,7 +37,6 @@ from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.data.axes_and_units import Stated
-from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
 from sdimu_calibration.core.plain_text import one_line
@@ -59,12 +58,12 @@ from sdimu_calibration.report.live_text import model_name
 from sdimu_calibration.report.progress_text import falling, light, sigma_words
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 from sdimu_calibration.storage.files.config import load_model
-from sdimu_calibration.storage.files.journal import Journal, digest
+from sdimu_calibration.storage.files.effect_file import effect_files
+from sdimu_calibration.storage.files.journal import JOURNAL, Journal, digest
 from sdimu_calibration.storage.files.model_choice import model_word, named_model
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 
-JOURNAL = "calibration.journal"
 BLOCK = 20
 SETTLE_S = 5.0
 """Time (s) after the end of the samples for which the last status is awaited: a lost packet is sent again after 3 s."""
@@ -98,7 +97,7 @@ class CalibrationNode:
         self._stay = declare.flag("stay", False, "do not leave at the end of the stream")
         _warm_up(self._options, self._models[0])
         # The text of an effect file too: its name says little of what it computes.
-        texts = [Path(file[0]).read_text() for text in added if (file := parse_key(text).file)]
+        texts = [file.read_text() for file in effect_files(added)]
         options = digest(self._options, load_model(model_word(model, handheld=False)), added, texts)
         checkpoint = declare.flag("checkpoint", True, "keep a journal with which a successor goes on")
         self._frames = declare_frames(declare)

@@ -20,6 +20,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Work
 from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data, read_metadata
+from sdimu_calibration.storage.bags.file_room import check_file_room
 from sdimu_calibration.storage.files.config import Schema, find_config, load_imu, quantity, read_yaml
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
 from sdimu_calibration.storage.files.whole_file import write_whole
@@ -256,17 +257,18 @@ def bags_below(folder: Path) -> list[Path]:
 _UNSAID = Said()
 
 
-def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID) -> None:
+def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID, *, replace: bool = False) -> None:
     """Write a first set file of bags, with what they or the user say of unit and power-on, for the user to complete.
 
     Parameters
     ----------
     path : Path
         File to make; bags are named from its folder.
+    replace : bool
+        A file that is there may go.
     """
     path = Path(path)
-    if path.exists():
-        raise DataError(f"{path}: the file is there already; choose another --out, or edit it")
+    check_file_room(path, "--out", replace=replace, sources=bags)
     base = path.resolve().parent
     entries = []
     names = [bag.resolve().name for bag in bags]

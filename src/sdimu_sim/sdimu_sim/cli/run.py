@@ -12,13 +12,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sdimu_calibration.cli.next_commands import PLAN, Asked, as_plan, print_advice, spelled
+from sdimu_calibration.cli.next_commands import (
+    PLAN,
+    PLAN_CHOSEN,
+    PLAN_RUN,
+    Asked,
+    as_plan,
+    check_plan_room,
+    print_advice,
+    spelled,
+)
 from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
 from sdimu_calibration.cli.serving import LivePage, PageOptions, ended
 from sdimu_calibration.core.data_error import DataError
-from sdimu_calibration.storage.files.whole_file import same_file, written_together
+from sdimu_calibration.storage.files.whole_file import put_aside, same_file, written_together
 from sdimu_sim.cli.options import SeedOption, World
 
 if TYPE_CHECKING:
@@ -35,6 +44,7 @@ START_NS = 1_700_000_000_000_000_000
 """Stamp of the begin of a simulated test (ns): the same in every run, so that runs of one seed are the same."""
 DEFAULT_PLAN = "kim18"
 DEFAULT_MODEL = "baseline"
+TRUTH = "truth.yaml"
 
 
 @dataclass(frozen=True)
@@ -140,7 +150,7 @@ def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, 
             "mount_max_deg": world.mount_max,
             "effects": list(world.effects),
             "temperature": world.temperature or "",
-            "truth_file": str(out / "truth.yaml"),
+            "truth_file": str(out / TRUTH),
         },
         # What the simulated gyros send is known, so the filter on the way need not wait for a turn.
         "calibration": {
@@ -182,14 +192,23 @@ def _clear(out: Path, plan: str = DEFAULT_PLAN, replace: bool = False) -> None:
     """
     from sdimu_calibration.storage.bags.bag_folder import check_room
     from sdimu_calibration.storage.bags.bag_metadata import METADATA
+    from sdimu_calibration.storage.files.journal import JOURNAL
+    from sdimu_sim.truth_file import check_truth_room
 
     bag, earlier = out / "bag", (out / "log" / "rate_table.yaml").is_file()
     if not earlier and (bag / METADATA).is_file():
         raise DataError(f"{bag}: sdimu run did not make this bag; move it, or name another folder with --out")
     check_room(bag, replace)
-    for stale in ("result.json", "report.html", "diagnosis.json", "calibration.journal", "choices.json"):
+    check_truth_room(out / TRUTH, bag, replace=True)
+    followed = _is_file(plan, out / PLAN)
+    if not earlier:
+        if not followed:
+            check_plan_room(out)
+        # The journal of a live test in that folder may be all that there is of it.
+        put_aside(out / JOURNAL)
+    for stale in ("result.json", "report.html", "diagnosis.json", JOURNAL, "choices.json"):
         (out / stale).unlink(missing_ok=True)
-    if earlier and not _is_file(plan, out / PLAN):
+    if earlier and not followed:
         (out / PLAN).unlink(missing_ok=True)
 
 
@@ -317,7 +336,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.storage.trace import traced
 
     result = read_result(out / "result.json")
-    truth = read_truth(out / "truth.yaml", result.body_frame)
+    truth = read_truth(out / TRUTH, result.body_frame)
     imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         opened = open_test(out / "bag", site, load_imu(imu))
@@ -372,9 +391,9 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
     from sdimu_calibration.storage.files.plan_file import write_plan
 
     if test.adaptive is not None:
-        plan, remark = (as_plan(summary.plan), f"The turns chosen for {test.adaptive}, as the motion showed them")
+        plan, remark = (as_plan(summary.plan), f"{PLAN_CHOSEN} {test.adaptive}, as the motion showed them")
     else:
-        plan, remark = load_plan(test.followed), f"The plan that was run: {test.followed}"
+        plan, remark = load_plan(test.followed), f"{PLAN_RUN}: {test.followed}"
     # A plan of the user's own in this place stays as it is written.
     if plan is not None and not _is_file(test.followed, out / PLAN):
         write_plan(part / PLAN, plan, [remark])

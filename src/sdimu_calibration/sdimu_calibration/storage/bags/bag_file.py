@@ -21,7 +21,8 @@ from sdimu_calibration.storage.bags.unpacking import Allowance, UnpackError, all
 
 ROS1 = ".bag"
 _PACKED = ".zstd"
-_SUFFIXES = (".mcap", ".db3", _PACKED, ROS1)
+BAG_SUFFIXES = (".mcap", ".db3", _PACKED, ROS1)
+"""Endings of files that hold messages."""
 _ZSTD = "zstd"
 _CONVERTER = Path(__file__).with_name("ros1_converter.py")
 _PATIENCE_S = 3600.0
@@ -169,7 +170,7 @@ def bag_parts(path: Path) -> list[Path]:
     if not path.exists():
         raise DataError(f"{path}: no such file or folder")
     if path.is_file():
-        if path.suffix not in _SUFFIXES:
+        if path.suffix not in BAG_SUFFIXES:
             raise DataError(
                 f"{path}: not a bag (expected a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag; sdimu import "
                 "makes one of columns in text, MAT and NPZ files)"

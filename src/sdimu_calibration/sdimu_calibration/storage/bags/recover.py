@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,7 @@ from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
 from sdimu_calibration.storage.bags.bag_metadata import FileEntry, TopicEntry, custom_data, write_metadata
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.mcap_walk import DamagedError, McapWalk
-from sdimu_calibration.storage.files.whole_file import beside, uninterrupted
+from sdimu_calibration.storage.files.whole_file import beside, free_beside, uninterrupted
 
 _NO_SCHEMA = Schema(0, b"", "", "")
 """Of a channel whose schema is not in the file."""
@@ -28,6 +29,8 @@ class Salvage:
     ----------
     damage : str
         What was wrong; empty for a whole file, which is left as it is.
+    kept : Path or None
+        Where the cut file is now.
     counts : dict of str to int
         Messages saved, by topic.
     first_ns, last_ns : int
@@ -38,6 +41,7 @@ class Salvage:
 
     path: Path
     damage: str = ""
+    kept: Path | None = None
     counts: dict[str, int] = field(default_factory=dict)
     first_ns: int = 0
     last_ns: int = 0
@@ -47,7 +51,7 @@ class Salvage:
 def recover(path: Path) -> tuple[Salvage, ...]:
     """Mend a bag in place: rewrite every cut file up to the cut, and make metadata.yaml anew.
 
-    The cut file stays beside the mended one with ``.damaged`` at its name.
+    The cut file stays beside the mended one with ``.damaged`` at its name, and a number where that name is taken.
 
     Parameters
     ----------
@@ -82,7 +86,9 @@ def _mend(part: Path) -> Salvage:
             raise DataError(f"{part}: no message is whole; nothing can be saved")
         if salvage.damage:
             with uninterrupted():
-                part.replace(part.with_name(part.name + DAMAGED_SUFFIX))
+                kept = part.with_name(part.name + DAMAGED_SUFFIX)
+                # One that was cut and mended before keeps its first cut file, too.
+                salvage.kept = part.rename(free_beside(kept) if os.path.lexists(kept) else kept)
                 copy.replace(part)
     finally:
         copy.unlink(missing_ok=True)

@@ -65,6 +65,7 @@ def export(
     own: Sequence[Effect] = (),
     rate_hz: float = 100.0,
     temperature_degc: float | None = None,
+    check: Callable[[Path], None] = lambda _: None,
 ) -> Exported:
     """Write a result in a form.
 
@@ -82,6 +83,8 @@ def export(
         Sample rate, where the form has a place for it.
     temperature_degc : float, optional
         Temperature at which matrices and biases are stated (deg C); that from which the coefficients count by default.
+    check : callable
+        Asked of every file before the first is written: raises where one must not be.
     """
     if form not in FORMS:
         raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")
@@ -92,9 +95,10 @@ def export(
         linear = linear.at(temperature_degc)
     missing = FORMS[form].cannot_hold(linear)
     source = Source(calibration, linear, imu, rate_hz, tuple(missing))
-    files = []
-    for addition, text in FORMS[form].write(source).items():
-        file = path.with_name(f"{path.stem}{addition}{path.suffix}")
+    texts = FORMS[form].write(source)
+    files = {path.with_name(f"{path.stem}{addition}{path.suffix}"): text for addition, text in texts.items()}
+    for file in files:
+        check(file)
+    for file, text in files.items():
         write_whole(file, text)
-        files.append(file)
     return Exported(tuple(files), tuple(missing))

@@ -6,7 +6,7 @@ A file holds formulas by sensor, the parameters in which they are linear, and fi
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -88,6 +88,11 @@ def find_effects(text: str) -> tuple[Effect, ...]:
         return (_equation(*key.equation),)
     register_plugins()
     return (selection.resolve(text),)
+
+
+def effect_files(keys: Iterable[str]) -> list[Path]:
+    """Return the files that keys of effects name."""
+    return [Path(file[0]) for key in keys if (file := parse_key(key).file)]
 
 
 def _of_file(path: str, parameter: str) -> tuple[Effect, ...]:

@@ -35,6 +35,7 @@ from sdimu_calibration.storage.files.whole_file import free_beside
 
 Stamps = Ints
 
+JOURNAL = "calibration.journal"
 FORMAT = "sdimu-journal/2"
 _HEAD = struct.Struct("<cII")
 _STATUS = struct.Struct("<qqq")
