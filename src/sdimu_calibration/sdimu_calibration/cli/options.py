@@ -314,10 +314,13 @@ def read_rests(text: str) -> Spans:
     """Read the rests of a run by hand (s): spans, or the path of a file with begin and end of one on each line."""
     if _SPAN.fullmatch(text.split(",", maxsplit=1)[0]):
         return read_spans(text, "--rests")
+    from sdimu_calibration.storage.files.bounded_file import read_text
+    from sdimu_calibration.storage.files.config import LONGEST_FILE
+
     path = Path(text)
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(path, LONGEST_FILE, "utf-8-sig").splitlines()
+    except (DataError, UnicodeDecodeError) as error:
         raise DataError(
             f"--rests {text}: expected spans of seconds such as 10-13,15.5-18, or a text file with begin and end of a "
             "rest on each line"

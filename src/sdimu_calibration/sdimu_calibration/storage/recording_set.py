@@ -209,6 +209,8 @@ def _named(folder: Path, word: str | None) -> str | None:
 def _member(source: BagSource, name: str, serial: str, power_on: str) -> Member:
     if not source.bag.exists():
         raise DataError(f"{source.bag}: no such bag (recording '{name}' of the set)")
+    if not (source.bag.is_dir() or source.bag.is_file()):
+        raise DataError(f"{source.bag}: is a device or a pipe, and no bag (recording '{name}' of the set)")
     said = custom_data(source.bag)
     return Member(name, source, serial or said.get("serial", ""), power_on or said.get("power_on", ""))
 

@@ -18,6 +18,7 @@ from sdimu_calibration.storage.bags.mcap_walk import MAGIC, DamagedError, McapWa
 from sdimu_calibration.storage.bags.own_process import run
 from sdimu_calibration.storage.bags.raw_messages import Block, RawMessages
 from sdimu_calibration.storage.bags.unpacking import Allowance, UnpackError, allowed, unpack_file
+from sdimu_calibration.storage.files.bounded_file import check_regular
 
 ROS1 = ".bag"
 _PACKED = ".zstd"
@@ -169,7 +170,8 @@ def bag_parts(path: Path) -> list[Path]:
     """
     if not path.exists():
         raise DataError(f"{path}: no such file or folder")
-    if path.is_file():
+    if not path.is_dir():
+        check_regular(path)
         if path.suffix not in BAG_SUFFIXES:
             raise DataError(
                 f"{path}: not a bag (expected a rosbag2 folder, an .mcap or .db3 file, or a ROS 1 .bag; sdimu import "
@@ -244,6 +246,7 @@ def _take(block: Messages, channel: int, unpack: Unpack | None, target: RawMessa
 
 def check_magic(part: Path) -> None:
     """Raise DataError unless the file begins as an MCAP file."""
+    check_regular(part)
     with part.open("rb") as stream:
         magic = stream.read(len(MAGIC))
     if not magic:

@@ -23,7 +23,7 @@ program sets: a copy that keeps times, written into the file, shows there alone.
 
 def file_states(path: Path) -> tuple[FileState, ...]:
     """Return what tells that a file, or one in a folder, was changed; empty where nothing is there."""
-    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.exists() else []
+    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path] if path.is_file() else []
     found = ((file, file.stat()) for file in files)
     return tuple((file, now.st_size, now.st_mtime_ns, now.st_ino, now.st_ctime_ns) for file, now in found)
 

@@ -10,9 +10,12 @@ from typing import Any
 
 import yaml
 
+from sdimu_calibration.storage.files.bounded_file import read_text
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 METADATA = "metadata.yaml"
+LONGEST_METADATA = 1 << 24
+"""Bytes of the metadata of a bag at most: a topic takes some hundred."""
 _ALIAS = re.compile(r"[&*]\w")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Ten times as fast as the loader in Python where PyYAML has it; both read the same."""
@@ -74,7 +77,7 @@ def write_metadata(
 def read_metadata(folder: Path, loader: Any = _LOADER) -> Mapping[str, Any]:
     """Content of metadata.yaml, empty when there is none or it cannot be used."""
     try:
-        content = yaml.load((folder / METADATA).read_text(encoding="utf-8"), Loader=loader)
+        content = yaml.load(read_text(folder / METADATA, LONGEST_METADATA), Loader=loader)
         information = content["rosbag2_bagfile_information"]
     except Exception:
         # PyYAML answers damage with errors of its own, of int(), of datetime and of the stack.

@@ -24,6 +24,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
 from sdimu_calibration.core.units import from_si, parse_quantity, parse_unit
+from sdimu_calibration.storage.files.bounded_file import read_text
 
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
@@ -207,13 +208,9 @@ class _UniqueKeys(yaml.SafeLoader):
 def read_mapping(path: Path, longest: int = LONGEST_FILE) -> dict[str, Any]:
     """Content of a YAML file of `longest` bytes at most, keys and values; DataError with file and line otherwise."""
     try:
-        if path.stat().st_size > longest:
-            raise DataError(f"{path}: longer than {longest} bytes, which no file of this kind is")
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeys)
+        data = yaml.load(read_text(path, longest), Loader=_UniqueKeys)
     except DataError:
         raise
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: is not text (expected YAML in UTF-8)") from error
     except yaml.YAMLError as error:

@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.bounded_file import read_text
 from sdimu_calibration.storage.files.whole_file import write_whole
+
+LONGEST_JSON = 1 << 28
+"""Bytes of a result at most: that of many recordings comes to some ten megabytes."""
 
 
 def write_json(path: Path, content: Any) -> None:
@@ -45,9 +49,9 @@ def read_json(path: Path, expected_format: str) -> dict[str, Any]:
     """Read an object whose key ``format`` is `expected_format`."""
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise DataError(f"{path}: no such file") from error
+        content = json.loads(read_text(path, LONGEST_JSON))
+    except DataError:
+        raise
     except (ValueError, RecursionError) as error:
         # JSON, text, and numbers of more digits than Python reads.
         raise DataError(f"{path}: not a JSON file ({error})") from error

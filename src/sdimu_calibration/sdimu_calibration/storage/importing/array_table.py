@@ -18,6 +18,7 @@ from sdimu_calibration.storage.bags.own_process import run
 from sdimu_calibration.storage.bags.unpacking import allowed
 from sdimu_calibration.storage.importing.import_map import BinaryMap
 from sdimu_calibration.storage.importing.mat_reader import OBJECT, PREFIX
+from sdimu_calibration.storage.importing.text_table import LONGEST_TABLE
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
@@ -152,6 +153,8 @@ class BinaryTable(ArrayTable):
                 f"{path}: {max(size, 0)} bytes are no whole rows of {form.columns} {form.type} ({row} bytes each); "
                 "check binary.type, columns and skip_bytes in the map"
             )
+        if size > LONGEST_TABLE:
+            raise DataError(f"{path}: {size} bytes, more than {LONGEST_TABLE}; cut it into several files")
         numbers = np.fromfile(path, kind, offset=form.skip_bytes).reshape(-1, form.columns)
         super().__init__(path, {})
         self._numbers: NDArray[Any] = numbers.astype(kind.newbyteorder("="))

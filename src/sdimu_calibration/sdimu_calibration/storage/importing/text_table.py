@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.bounded_file import check_regular, read_text
 
 _COMMENT = ("#", "%")
 _DELIMITERS = (";", "\t", ",")
@@ -31,6 +32,8 @@ _LOOKED_AT = 200
 matter."""
 _MOST_BROKEN = 0.005
 """Share of broken lines at most: a link that loses more loses numbers inside the lines, too."""
+LONGEST_TABLE = 1 << 32
+"""Bytes of a table of numbers at most: in memory its lines take three times as much. Several files are one import."""
 _MOST_HEADINGS = 10
 """Number of numeric heading lines at most: what is longer is a table of its own."""
 
@@ -39,8 +42,7 @@ def check_file(path: Path) -> None:
     """Refuse what is no file to import."""
     if path.is_dir():
         raise DataError(f"{path}: is a folder: name the files in it (a folder that is a bag is read without an import)")
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
+    check_regular(path)
 
 
 class TextTable:
@@ -68,7 +70,7 @@ class TextTable:
         self.path = path
         self._decimal = decimal
         try:
-            self._lines = path.read_text(encoding="utf-8-sig").splitlines()
+            self._lines = read_text(path, LONGEST_TABLE, "utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
             raise DataError(
                 f"{path}: is not text (expected CSV in UTF-8, MAT or NPZ); for bare numbers state their "
