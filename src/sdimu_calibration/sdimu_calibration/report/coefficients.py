@@ -15,7 +15,7 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.site_reference import relative_line
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import table
-from sdimu_calibration.report.drawing import AFTER, Figure, lay_out
+from sdimu_calibration.report.drawing import AFTER, Figure, lay_out, literal
 from sdimu_calibration.report.effect_words import effect_of_key, tip, title_of
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import is_free
@@ -137,7 +137,7 @@ def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) ->
     figure.add(
         "scatter",
         x=calibration.values[shown] / size,
-        y=names,
+        y=[literal(name) for name in names],
         mode="markers",
         marker={"color": AFTER, "size": 7},
         error_x={"array": sigma, "color": AFTER, "thickness": 1.5},

@@ -60,8 +60,8 @@ def deviates(
     figure = Figure()
     figure.add(
         "heatmap",
-        x=list(columns),
-        y=[c.replace("_", " ") for c in lines],
+        x=[literal(c) for c in columns],
+        y=[literal(c.replace("_", " ")) for c in lines],
         z=value,
         text=text,
         texttemplate="%{text}",
@@ -235,7 +235,7 @@ def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, whit
 
 def explained(parts: Sequence[data.Explained]) -> Figure:
     """Misfit against what each found effect predicts, binned means; on the diagonal when it is right."""
-    figure = Figure(rows=1, cols=len(parts), titles=[part.label for part in parts], gap_x=0.1)
+    figure = Figure(rows=1, cols=len(parts), titles=[literal(part.label) for part in parts], gap_x=0.1)
     for column, part in enumerate(parts, 1):
         x, mean, error = data.binned(part.predicted, part.misfit, _BINS)
         ends = [float(x.min()), float(x.max())] if len(x) else [0.0, 0.0]

@@ -31,7 +31,7 @@ def sigma_history(calibration: Calibration) -> Figure:
     figure = Figure(
         rows=rows,
         cols=_COLUMNS,
-        titles=[title(effect) for effect in panels],
+        titles=[literal(title(effect)) for effect in panels],
         gap_y=min(_GAP / (_PANEL_HEIGHT * rows), 1.0 / max(rows - 1, 1)),
         gap_x=0.16,
     )

@@ -31,10 +31,10 @@ def heat_map(done: Study) -> Figure:
     people = done.people
     z = np.array([one.deviates for one in people.coefficients])
     figure = Figure()
-    names = [one.name for one in people.coefficients]
+    names = [literal(one.name) for one in people.coefficients]
     figure.add(
         "heatmap",
-        x=list(people.units),
+        x=[literal(unit) for unit in people.units],
         y=names,
         z=z,
         zmin=-_LARGEST,
@@ -46,7 +46,8 @@ def heat_map(done: Study) -> Figure:
         hovertemplate="%{x}<br>%{y}<br>%{z:.2f} sigma<extra></extra>",
     )
     for one in people.out:
-        figure.annotate("<b>\N{MULTIPLICATION SIGN}</b>", x=one.unit, y=one.coefficient, font={"size": 14})
+        x, y = literal(one.unit), literal(one.coefficient)
+        figure.annotate("<b>\N{MULTIPLICATION SIGN}</b>", x=x, y=y, font={"size": 14})
     figure.y_axes(autorange="reversed", automargin=True, type="category")
     figure.x_axes(type="category", side="top")
     return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 70, "b": 20})
@@ -67,14 +68,14 @@ def dot_plot(done: Study) -> Figure:
         figure.add(
             "scatter",
             x=np.array([value for _, _, value in dots]),
-            y=[name for name, _, _ in dots],
+            y=[literal(name) for name, _, _ in dots],
             text=[literal(unit) for _, unit, _ in dots],
             mode="markers+text" if is_out else "markers",
             textposition="top center",
             marker={"symbol": symbol, "size": size, "color": ink, "line": {"width": 2}},
             hovertemplate="%{text}<br>%{y}: %{x:.2f} spreads<extra></extra>",
         )
-    names = [one.name for one in people.coefficients]
+    names = [literal(one.name) for one in people.coefficients]
     figure.shape("line", x0=0.0, x1=0.0, line={"color": INK, "width": 1}, opacity=1)
     # Above: thirty coefficients reach below the first screen.
     figure.x_axes(title="unit less mean of the units (spreads between units)", side="top")
@@ -108,7 +109,7 @@ def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[s
         Cut from the names above the panels.
     """
     rows = math.ceil(len(some) / _PANELS)
-    titles = [one.name.removeprefix(f"{heading}_") for one in some]
+    titles = [literal(one.name.removeprefix(f"{heading}_")) for one in some]
     figure = Figure(rows=rows, cols=_PANELS, titles=titles, gap_x=0.07, gap_y=0.34 / rows)
     dated = bool(np.isfinite(fleet.dates_s).all() and np.ptp(fleet.dates_s) > 0.0)
     x = [_day(s) for s in fleet.dates_s] if dated else list(range(1, len(fleet.serials) + 1))
