@@ -18,7 +18,7 @@ from sdimu_calibration.storage.bags.own_process import run
 from sdimu_calibration.storage.bags.unpacking import allowed
 from sdimu_calibration.storage.importing.import_map import BinaryMap
 from sdimu_calibration.storage.importing.mat_reader import OBJECT, PREFIX
-from sdimu_calibration.storage.importing.text_table import LONGEST_TABLE
+from sdimu_calibration.storage.importing.text_file import LONGEST_TABLE
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
@@ -58,7 +58,20 @@ def _listed(value: Any) -> Any:
     return (value,) if isinstance(value, str | int) else value
 
 
-Column = Annotated[int | str, Field(union_mode="left_to_right")]
+def _no_truth(value: Any) -> Any:
+    """Refuse ``true`` and ``yes``, which YAML does not read as words, and which would be column 1."""
+    if isinstance(value, bool):
+        raise ValueError(f"{str(value).lower()} names no column: write a heading of this name between quotes")
+    return value
+
+
+def _one_character(value: str) -> str:
+    if len(value) != 1 or value in '\r\n"#%':
+        raise ValueError(f"{value!r} cannot stand between columns: give one character, such as ';'")
+    return value
+
+
+Column = Annotated[int | str, Field(union_mode="left_to_right"), BeforeValidator(_no_truth)]
 Three = Annotated[tuple[float, float, float], BeforeValidator(_three)]
 Sign = Literal[1, -1]
 
@@ -212,8 +225,8 @@ class ImportMap(Schema):
     ----------
     delimiter : str, optional
         Between the columns of a text file; recognised when left out.
-    decimal : str
-        Decimal sign of a text file.
+    decimal : str, optional
+        Decimal sign of a text file; recognised when left out.
     skip_lines : int, optional
         Lines before the data of a text file, the last of them with the headings; recognised when left out.
     binary : BinaryMap, optional
@@ -227,8 +240,8 @@ class ImportMap(Schema):
     gyro: GyroMap
     temperature: TemperatureMap | None = None
     phase: PhaseMap | None = None
-    delimiter: str | None = Field(default=None, min_length=1)
-    decimal: Literal[".", ","] = "."
+    delimiter: Annotated[str, AfterValidator(_one_character)] | None = None
+    decimal: Literal[".", ","] | None = None
     skip_lines: int | None = Field(default=None, ge=0)
     binary: BinaryMap | None = None
 
