@@ -157,6 +157,33 @@ def test_gaps_jitter_and_nan_survive_the_way_into_the_bag(tmp_path, samples):
     assert np.array_equal(read.f_ib_b, np.delete(found.f_ib_b, 7, axis=0))
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [{20: "210"}, {20: "0.0021"}, {20: "2.1", 30: "-0"}, {0: "100"}, {39: "0.04"}, {0: "7", 20: "210", 39: "0.04"}],
+)
+def test_a_lone_stamp_that_lost_its_place_is_left_out_with_its_line(tmp_path, wrong):
+    samples = Samples(1000)
+    rows = [k if k < 39 else 999 for k in wrong]
+    lines = samples.csv(tmp_path / "a.csv").read_text().splitlines()
+    for row, stamp in zip(rows, wrong.values(), strict=True):
+        lines[row + 1] = ",".join([stamp, *lines[row + 1].split(",")[1:]])
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    found = read_files([tmp_path / "a.csv"], chart(tmp_path))
+    samples.t, samples.w, samples.f = (np.delete(x, rows, axis=0) for x in (samples.t, samples.w, samples.f))
+    samples.check(found)
+    numbered = ", ".join(str(row + 2) for row in rows)
+    assert [note for note in found.notes if f"(line {numbered})" in note and "left out" in note]
+
+
+@pytest.mark.parametrize(
+    "order", [[*range(20), 21, 20, *range(22, 40)], [*range(10), *range(25, 40)], [0, *range(25, 40)], [20, *range(20)]]
+)
+def test_late_samples_and_gaps_are_no_lone_stamps(tmp_path, samples, order):
+    samples.t, samples.w, samples.f = (x[order] for x in (samples.t, samples.w, samples.f))
+    found = read_files([samples.csv(tmp_path / "a.csv")], chart(tmp_path))
+    assert len(found.ns) == len(order) - (order[0] == 20)
+
+
 def test_two_files_with_the_same_stamps_are_put_side_by_side(tmp_path, samples):
     for name, part in (("x_acc.csv", samples.f), ("x_gyro.csv", samples.w)):
         np.savetxt(tmp_path / name, np.column_stack([samples.t, part]), fmt="%.17g", delimiter=",")
@@ -223,6 +250,14 @@ def test_a_line_that_ends_early_is_named(tmp_path, samples):
         ({"gyro": {"columns": ["wx", "gy", "gz"]}}, "no column 'wx' (there are: t, gx, gy"),
         ({"gyro": {"columns": [2, 3, 9]}}, "no column 9 (line 2 has 7)"),
         ({"time": {"start": "1960-01-01T00:00:00"}}, "line 2, column t: a time before 1970"),
+        ({"time": {"start": "9999-12-31T23:59:59"}}, "line 2, column t: a time not between 1970 and 2096"),
+        ({"time": {"start": "0001-01-01T00:00:00Z"}}, "line 2, column t: a time not between 1970 and 2096"),
+        ({"time": {"unit": "99999999999 h"}}, "line 2, column t: "),
+        ({"gyro": {"columns": ["gx", "gx", "gz"]}}, "gyro x and gyro y both name column 'gx' of "),
+        ({"gyro": {"columns": ["gx", "gy", 2]}}, "gyro x and gyro z both name column '2' of "),
+        ({"gyro": {"columns": ["ax", "gy", "gz"]}}, "accel x and gyro x both name column 'ax' of "),
+        ({"accel": {"columns": ["t", "ay", "az"]}}, "accel x and time both name column 't' of "),
+        ({"temperature": {"column": "gz"}}, "gyro z and temperature both name column 'gz' of "),
     ],
 )
 def test_columns_and_times_that_are_not_there_are_told(tmp_path, samples, changes, told):
@@ -239,6 +274,9 @@ def test_columns_and_times_that_are_not_there_are_told(tmp_path, samples, change
         ({"gyro": {"sign": 2}}, "gyro.sign"),
         ({"speed": {}}, "speed: unknown key"),
         ({"time": {"rate_hz": 100.0}}, "either column or rate_hz"),
+        ({"time": {"column": True}}, "time.column: true names no column"),
+        ({"delimiter": "ab"}, "delimiter: 'ab' cannot stand between columns"),
+        ({"delimiter": "\n"}, "delimiter: '\\n' cannot stand between columns"),
     ],
 )
 def test_a_wrong_map_is_told_by_file_and_key(tmp_path, changes, told):

@@ -22,6 +22,7 @@ from sdimu_calibration.storage.importing.text_file import LONGEST_TABLE
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
+_VERSION_7_3 = b"MATLAB 7.3"
 _READER = Path(__file__).with_name("mat_reader.py")
 _PATIENCE_S = 120.0
 """Time (s) that a MAT file may take: a gigabyte takes ten."""
@@ -45,6 +46,16 @@ class ArrayTable:
                     f"{self.path}: variable {column} has {len(part)} rows, {columns[0]} has {len(parts[0])}"
                 )
         return np.concatenate(parts, axis=1)
+
+    def place(self, column: int | str) -> int | str:
+        """Return what tells a column from others."""
+        return str(column)
+
+    def contents(self) -> str:
+        """List the variables with their sizes."""
+        self._refuse_object("")
+        sizes = {name: " x ".join(map(str, np.shape(array))) for name, array in sorted(self._arrays.items())}
+        return ", ".join(f"{name} ({size})" if size else name for name, size in sizes.items()) or "(none)"
 
     def numbers(self, column: int | str) -> NDArray[Any]:
         """Read one column in the type it has, shape (n,), so that integer stamps stay exact."""
@@ -124,7 +135,7 @@ def read_mat(path: Path) -> ArrayTable | None:
         head = stream.read(_HDF5_AT + len(_HDF5))
     if not head:
         raise DataError(f"{path}: the file is empty")
-    if head[_HDF5_AT:] == _HDF5 or head.startswith(_HDF5):
+    if head[_HDF5_AT:] == _HDF5 or head.startswith((_HDF5, _VERSION_7_3)):
         raise DataError(f"{path}: is a MAT file of version 7.3; save it in MATLAB with '-v7'")
     if _is_text(head):
         return None

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.bursts import find_bursts
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage.importing.array_table import ArrayTable
 from sdimu_calibration.storage.importing.import_map import ISO, NANOSECONDS, TimeMap, tick
-from sdimu_calibration.storage.importing.text_table import TextTable
+from sdimu_calibration.storage.importing.text_table import MOST_BROKEN, TextTable
 
 Stamps = Ints
 Table = TextTable | ArrayTable
@@ -26,6 +26,10 @@ _LONGEST = 19
 """Digits of a number of nanoseconds in 64 bits."""
 _NEAR_EDGE = 0.02
 """Share of a power of two below it that a counter which ends there may not have reached: samples missing at its end."""
+_FAR = 3.0
+"""Number of intervals by which a lone stamp lies outside its neighbours: late messages are less out of order."""
+_PASSES = 10
+"""Number of looks for lone stamps at most: what shows more behind each that is taken out is no accident."""
 _LARGEST_NS = 4e18
 """Times beyond this (the year 2096) do not fit a stamp."""
 
@@ -59,11 +63,53 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
         raise DataError(f"{table.path}: {len(ns)} times for {samples} samples")
     if time.counter is not None:
         ns, notes = counted(table, time.counter, ns, time.rate_hz)
-    ns = ns + _start_ns(time.start)
+    start_ns = _start_ns(time.start)
+    far = np.abs(ns.astype(np.float64) + start_ns) > _LARGEST_NS
+    if far.any():
+        where = f"{table.line_of(int(np.argmax(far)))}, column {column}"
+        raise DataError(f"{table.path}: {where}: a time not between 1970 and 2096; check time.unit and time.start")
+    ns = ns + start_ns
     if (ns < 0).any():
         row = int(np.argmax(ns < 0))
         raise DataError(f"{table.path}: {table.line_of(row)}, column {column}: a time before 1970; check time.start")
     return np.asarray(ns, np.int64), (*notes, *(() if notes else _proposed(ns)))
+
+
+def lone_stamps(ns: Stamps) -> Ints:
+    """Find stamps that cannot be right, such as one that lost its decimal point.
+
+    Parameters
+    ----------
+    ns : ndarray of int64, shape (n,)
+
+    Returns
+    -------
+    ndarray of int64, shape (m,)
+        Rows with a stamp far from its neighbours, which follow one another as if one sample lay between them; the first
+        row where it is far behind the second, and the last where it is far before the last but one. None where there
+        are many: they are no accidents.
+    """
+    rows = np.arange(len(ns))
+    for _ in range(_PASSES):
+        lone = _lone(ns[rows])
+        if not lone.any():
+            left_out = np.setdiff1d(np.arange(len(ns)), rows)
+            return left_out if len(left_out) <= max(1.0, MOST_BROKEN * len(ns)) else np.zeros(0, np.int64)
+        rows = rows[~lone]
+    return np.zeros(0, np.int64)
+
+
+def _lone(ns: Stamps) -> Bools:
+    """Whether each stamp, shape (n,), is far from its neighbours."""
+    out = np.zeros(len(ns), np.bool_)
+    usual = float(np.median(np.diff(ns))) if len(ns) > 2 else 0.0
+    if usual > 0.0:
+        far = _FAR * usual
+        apart = (ns[2:] - ns[:-2]) / usual
+        outside = (ns[1:-1] < ns[:-2] - far) | (ns[1:-1] > ns[2:] + far)
+        out[1:-1] = (apart > 1.5) & (apart < 2.5) & outside
+        out[0], out[-1] = ns[0] > ns[1] + far, ns[-1] < ns[-2] - far
+    return out
 
 
 def _proposed(ns: Stamps) -> tuple[str, ...]:
@@ -135,7 +181,9 @@ def _from_text(table: TextTable, column: int | str, unit: str) -> Stamps:
         return _dates(table, column, cells)
     number, name = tick(unit)
     exact = _decimals(cells, _DIGITS[name]) if name in _DIGITS else None
-    return _scaled(table, column, table.floats([column])[:, 0], unit) if exact is None else exact * number
+    if exact is None or exact.max(initial=0) > _LARGEST_NS / number:
+        return _scaled(table, column, table.floats([column])[:, 0], unit)
+    return exact * number
 
 
 def _dates(table: TextTable, column: int | str, cells: NDArray[np.str_]) -> Stamps:
@@ -143,17 +191,17 @@ def _dates(table: TextTable, column: int | str, cells: NDArray[np.str_]) -> Stam
     try:
         return plain.astype("datetime64[ns]").astype(np.int64)
     except ValueError as error:
-        row = next(k for k, cell in enumerate(plain.tolist()) if not _is_date(cell))
+        row = next(k for k, cell in enumerate(plain.tolist()) if not is_date(cell))
         where = f"{table.path}: {table.line_of(row)}, column {column}"
         raise DataError(f"{where}: '{cells[row]}' is not a date such as 2024-05-31T12:00:00.01 (UTC)") from error
 
 
-def _is_date(cell: str) -> bool:
+def is_date(cell: str) -> bool:
+    """Whether a cell is a date such as 2024-05-31T12:00:00.01 (UTC)."""
     try:
-        np.datetime64(cell, "ns")
+        return not np.isnat(np.datetime64(cell.rstrip("Z"), "ns"))
     except ValueError:
         return False
-    return True
 
 
 def _decimals(cells: NDArray[np.str_], digits: int) -> Stamps | None:

@@ -15,7 +15,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
 from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap
-from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, read_stamps
+from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, lone_stamps, read_stamps
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file
 
 _KELVIN = 273.15
@@ -90,6 +90,7 @@ def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
 
 def _together(tables: list[Table], chart: ImportMap) -> Imported:
     """Read what one stretch of time holds."""
+    _refuse_twice(tables, chart)
     accel_ns, f_ib_b, told = _sensor(tables, chart, chart.accel, "accel")
     gyro_ns, omega_ib_b, more = _sensor(tables, chart, chart.gyro, "gyro")
     notes = [note for table in tables if isinstance(table, TextTable) for note in table.notes]
@@ -100,6 +101,26 @@ def _together(tables: list[Table], chart: ImportMap) -> Imported:
     temperature = None if chart.temperature is None else _temperature(tables, chart, chart.temperature)
     status = None if chart.phase is None else _status(tables, chart, chart.phase)
     return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes), status)
+
+
+def _refuse_twice(tables: list[Table], chart: ImportMap) -> None:
+    """Refuse a map that takes one column for two things."""
+    taken: dict[tuple[Path, int | str], str] = {}
+
+    def take(table: Table, column: int | str | None, name: str) -> None:
+        if column is None:
+            return
+        first = taken.setdefault((table.path, table.place(column)), name)
+        if first != name:
+            raise DataError(f"import map: {first} and {name} both name column '{column}' of {table.path}")
+
+    for what, part in (("accel", chart.accel), ("gyro", chart.gyro)):
+        table = _chosen(tables, part.file, what)
+        for axis, column in zip("xyz", part.columns, strict=False):
+            take(table, column, f"{what} {axis}")
+        take(table, part.time if part.time is not None else chart.time.column, "time")
+    if chart.temperature is not None:
+        take(_chosen(tables, chart.temperature.file, "temperature"), chart.temperature.column, "temperature")
 
 
 def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
@@ -195,6 +216,11 @@ def _sensor(
         raise DataError(f"{table.path}: {what}: {part.columns[0]} has {raw.shape[1]} columns, expected three")
     column = part.time if part.time is not None else chart.time.column
     ns, notes = read_stamps(table, column, chart.time, len(raw))
+    by_column = column is not None and chart.time.counter is None
+    lone = lone_stamps(ns) if by_column else np.zeros(0, np.int64)
+    if isinstance(table, TextTable) and len(lone):
+        table.leave_out(lone.tolist(), "a time that does not lie between those before and after it")
+        raw, ns = np.delete(raw, lone, axis=0), np.delete(ns, lone)
     values = (raw - np.array(part.bias)) * part.factor
     if part.increments:
         values = values / _interval_s(table, ns)
