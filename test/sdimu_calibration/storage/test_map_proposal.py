@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY
@@ -12,6 +17,7 @@ from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.importing.import_map import ImportMap, load_import_map
 from sdimu_calibration.storage.importing.importer import read_files
 from sdimu_calibration.storage.importing.map_proposal import propose_maps
+from sdimu_calibration.storage.importing.text_table import column_text
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
 
 
@@ -137,3 +143,166 @@ def test_recordings_of_others_get_the_map_that_reads_them(recorded, tmp_path, na
     file.write_text(proposal.text)
     found = read_files([path], load_import_map(file))
     assert abs(np.median(np.linalg.norm(found.f_ib_b, axis=1)) / STANDARD_GRAVITY - 1.0) < 0.1
+
+
+N = 200
+RNG = np.random.default_rng(7)
+STATIC = np.column_stack(
+    [np.arange(N) * 0.01, RNG.normal([0.1, -0.2, 9.8], 0.01, (N, 3)), RNG.normal(0.0, 0.002, (N, 3))]
+)
+
+
+def read_back(proposal, path, folder):
+    (folder / "map.yaml").write_text(proposal.text, "utf-8")
+    return read_files([path], load_import_map(folder / "map.yaml"))
+
+
+@given(st.text())
+@settings(max_examples=50, deadline=None)
+def test_every_heading_is_written_so_that_the_map_reads_it(name):
+    assert yaml.safe_load(f"[{column_text(name)}, 2]") == [name, 2]
+
+
+@given(st.lists(st.text(st.characters(codec="utf-8", exclude_characters="xyzXYZ"), max_size=6), min_size=7, max_size=7))
+@settings(max_examples=40, deadline=None)
+def test_whatever_the_headings_are_the_map_reads_the_columns(tmp_path_factory, headings):
+    folder = tmp_path_factory.mktemp("headings")
+    with (folder / "a.csv").open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(headings)
+        rows.writerows([[f"{value:.6f}" for value in row] for row in STATIC])
+    (proposal,) = propose_maps([folder / "a.csv"])
+    found = read_back(proposal, folder / "a.csv", folder)
+    np.testing.assert_allclose(found.f_ib_b, STATIC[:, 1:4], atol=1e-5)
+
+
+@pytest.mark.parametrize("quote", ["\\", '"', "x: [", "#", "\x1b", "µ😀"])
+def test_the_characters_of_yaml_in_headings_do_no_harm(tmp_path, hand, quote):
+    path = tmp_path / "log.csv"
+    names = [f"{sensor}{quote}{axis}" for sensor in ("acc", "gyro") for axis in "xyz"]
+    write(path, ",".join(["t", *names]), np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b]))
+    (proposal,) = propose_maps([path])
+    same(read_back(proposal, path, tmp_path), hand)
+
+
+@pytest.mark.parametrize("headings", ["t,1,2,3,4,5,6", "0,1,2,3,4,5,6", ""])
+@pytest.mark.parametrize("index", [False, True])
+def test_headings_in_numbers_and_an_index_of_the_rows_mislead_nobody(tmp_path, hand, headings, index):
+    columns = [hand.t, hand.f_ib_b, hand.omega_ib_b]
+    path = tmp_path / "log.csv"
+    rows = [",".join(f"{value:.6f}" for value in row) for row in np.column_stack(columns)]
+    rows = [f"{k},{row}" for k, row in enumerate(rows)] if index else rows
+    path.write_text("\n".join([*([("," if index else "") + headings] if headings else []), *rows]))
+    (proposal,) = propose_maps([path])
+    found = read_back(proposal, path, tmp_path)
+    same(found, hand)
+    np.testing.assert_allclose(found.ns * 1e-9, hand.t, atol=1e-5)
+
+
+def test_an_index_of_the_rows_is_no_time(tmp_path, hand):
+    columns = np.column_stack([np.arange(len(hand.t)), hand.f_ib_b, hand.omega_ib_b])
+    (proposal,) = propose_maps([write(tmp_path / "a.csv", "", columns)])
+    assert any("column 1 counts samples" in word and "correct it" in word for word in proposal.words)
+    (named,) = propose_maps([write(tmp_path / "b.csv", "t,ax,ay,az,gx,gy,gz", columns)])
+    assert any("if they count samples, write rate_hz" in word for word in named.words)
+
+
+@pytest.mark.parametrize("others", ["fixed", "temperature", "second", "magnetometer", "gyros first"])
+def test_columns_without_headings_are_told_by_what_turns_together(tmp_path, hand, others):
+    rng = np.random.default_rng(2)
+    n = len(hand.t)
+    f, w = hand.f_ib_b, hand.omega_ib_b
+    field = 30.0 * np.roll(f, 1, axis=1) / 9.8 + rng.normal(0.0, 0.05, (n, 3))
+    beside = {
+        "fixed": [np.tile([0.0, 0.0, 9.8], (n, 1)), f, np.full(n, 4000.0), w, np.full(n, 4000.0)],
+        "temperature": [rng.normal(25.0, 0.01, n), f, w],
+        "second": [f, 1.01 * f[:, [1, 0, 2]] + rng.normal(0.0, 0.02, (n, 3)), w],
+        "magnetometer": [field, f, w],
+        "gyros first": [w, rng.normal(1013.0, 0.2, n), f],
+    }[others]
+    path = write(tmp_path / "log.csv", "", np.column_stack([hand.t, *beside]))
+    (proposal,) = propose_maps([path])
+    same(read_by(proposal, path), hand)
+
+
+def test_a_second_accelerometer_is_no_gyro(tmp_path, hand):
+    f = hand.f_ib_b
+    second = np.column_stack([hand.t, f, f + np.random.default_rng(2).normal(0.0, 0.02, f.shape)])
+    for name, heading in (("a.csv", ""), ("b.csv", "t,acc_lo_x,acc_lo_y,acc_lo_z,acc_hi_x,acc_hi_y,acc_hi_z")):
+        with pytest.raises(DataError, match="are not to be told in it"):
+            propose_maps([write(tmp_path / name, heading, second)])
+    heading = "t,acc_lo_x,acc_lo_y,acc_lo_z,acc_hi_x,acc_hi_y,acc_hi_z,gyro_x,gyro_y,gyro_z"
+    path = write(tmp_path / "c.csv", heading, np.column_stack([second, hand.omega_ib_b]))
+    low, high = propose_maps([path])
+    assert (low.suffix, high.suffix) == ("_lo", "_hi")
+    same(read_by(low, path), hand)
+
+
+def test_of_two_columns_of_one_name_the_one_that_is_measured_is_taken(tmp_path, hand):
+    fixed = np.tile([0.0, 0.0, 9.8], (len(hand.t), 1))
+    columns = np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b, fixed])
+    path = write(tmp_path / "a.csv", "t,ax,ay,az,gx,gy,gz,wx,wy,wz", columns)
+    (proposal,) = propose_maps([path])
+    same(read_by(proposal, path), hand)
+    columns[:, 7:] = hand.omega_ib_b
+    with pytest.raises(DataError, match="gx, gy, gz and wx, wy, wz may be one sensor"):
+        propose_maps([write(tmp_path / "b.csv", "t,ax,ay,az,gx,gy,gz,wx,wy,wz", columns)])
+
+
+def test_units_in_headings_that_the_numbers_contradict_are_told(tmp_path, hand):
+    heading = "time [ms],acc_x [g],acc_y [g],acc_z [g],gyro_x [deg/s],gyro_y [deg/s],gyro_z [deg/s]"
+    path = write(tmp_path / "a.csv", heading, np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b]))
+    (proposal,) = propose_maps([path])
+    for word in ("the headings say g,", "the headings say deg/s,", "its heading says ms,"):
+        assert any(word in line and "check it" in line for line in proposal.words)
+    same(read_by(proposal, path), hand)
+
+
+def test_columns_that_never_change_or_hold_few_numbers_are_told(tmp_path, hand):
+    columns = np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b])
+    columns[:, 6] = 0.5
+    columns[::4, 2] = np.nan
+    (proposal,) = propose_maps([write(tmp_path / "a.csv", "t,ax,ay,az,gx,gy,gz", columns)])
+    assert any("in gz never change" in word for word in proposal.words)
+    assert any(f"{len(columns[::4])} of {len(columns)} samples have no number" in word for word in proposal.words)
+
+
+def cells(content, form):
+    return [",".join(cell % value for cell, value in zip(form.split(), row, strict=True)) for row in content]
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        (cells(0.0 * STATIC, "%.1f " * 7), "hold zeros alone"),
+        (cells(STATIC, "%.2f 0x%d 0x%d 0x%d %.2f %.2f %.2f"), "line 2, column ax: '0x0' is not a number"),
+        (cells(STATIC, "%.4f " * 7)[:40] + ["1,2", "3,4"] * 5, "line 42 has 2 columns"),
+        (cells(STATIC, "%.2f " + 6 * "nan%.0s "), "0 of 200 lines hold a number in all"),
+        (["0.1,1,2,3,4,5,6"], "1 of 1 lines hold a number"),
+    ],
+)
+def test_a_table_that_cannot_be_read_is_told_in_one_line(tmp_path, rows, told):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t,ax,ay,az,gx,gy,gz", *rows]))
+    with pytest.raises(DataError, match=told):
+        propose_maps([path])
+
+
+def test_names_of_imus_make_names_of_files(tmp_path, hand):
+    names = ["../../up", "x" * 300, "imu a", "*"]
+    heading = ",".join(f"{name}_{kind}_{axis}" for name in names for kind in ("acc", "gyro") for axis in "xyz")
+    columns = np.column_stack([hand.t[:50]] + [hand.f_ib_b[:50], hand.omega_ib_b[:50]] * 4)
+    proposals = propose_maps([write(tmp_path / "a.csv", f"t,{heading}", columns)])
+    assert len({proposal.suffix for proposal in proposals}) == 4
+    assert all(proposal.suffix.isidentifier() and len(proposal.suffix) < 50 for proposal in proposals)
+
+
+def test_arrays_are_listed_for_the_map_that_the_user_writes(tmp_path):
+    acc, t = np.zeros((7, 3)), np.arange(7.0)
+    savemat(tmp_path / "a.mat", {"imu": {"acc": acc, "t": t}})
+    np.savez(tmp_path / "a.npz", acc=acc, t=t)
+    for name, listed in (("a.mat", "imu.acc (7 x 3), imu.t (7)"), ("a.npz", "acc (7 x 3), t (7)")):
+        with pytest.raises(DataError) as error:
+            propose_maps([tmp_path / name])
+        assert listed in str(error.value)
+        assert "--map" in str(error.value)

@@ -8,17 +8,21 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.axes_and_units import DEGREE, fitting_scale
-from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_quantity, parse_unit
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
 
 _FORCE_UNITS = ("m/s^2", "g", "mg", "cm/s^2")
 _COUNTS_PER_G = (16384, 8192, 4096, 2048, 1024, 512, 256)
 """Counts of 1 g of converters of 16 bits from 2 to 16 g, and of 10 to 13 bits."""
-_COUNTS_PER_DPS = (131, 65.5, 32.8, 16.4, 114.2857, 57.142857, 28.571429, 14.285714, 14.375, 16.0)
-"""Counts of 1 deg/s: 16 bits of 250 to 2000 deg/s, 8.75 to 70 mdeg/s, and of the ITG-3200 and BMI parts."""
+_COUNTS_PER_DPS = (131, 65.5, 32.8, 16.4, 114.2857, 57.142857, 28.571429, 14.285714, 14.375, 16.0, 1000.0)
+"""Counts of 1 deg/s: 16 bits of 250 to 2000 deg/s, 8.75 to 70 mdeg/s, of the ITG-3200 and BMI parts,
+and of numbers in mdeg/s."""
 _LARGEST_BIAS = float(np.radians(1.0))
 """Rate of an IMU that mostly rests (rad/s): what is larger is none in rad/s."""
 _NEAR = 0.15
 """Share by which the median of |f| may differ from gravity: bias and scale of an uncalibrated sensor."""
+_FAR = 0.3
+"""Share by which it may differ in the unit that headings state: what differs by more is another unit."""
 
 
 class Scale(NamedTuple):
@@ -55,9 +59,44 @@ def accel_scale(f: Floats, unit: str) -> Scale:
     unit : str
         By the headings; empty where they say none.
     """
-    size = float(np.nanmedian(np.linalg.norm(f, axis=1)))
-    if unit:
-        return _stated(unit, "m/s^2")
+    size = median_size(f)
+    if not size > 0.0:
+        raise DataError("the columns of the accelerometers hold zeros alone: name others in a map (--map)")
+    by_gravity = _by_gravity(size)
+    if unit and _dimension_is(unit, "m/s"):
+        return _stated(unit)
+    if unit and _dimension_is(unit, "m/s^2"):
+        si = size * parse_unit(unit).factor
+        if abs(si / STANDARD_GRAVITY - 1.0) < _FAR:
+            return _stated(unit)
+        doubt = f"the headings say {unit}, which makes a median of |f| of {si:.4g} m/s^2, and not gravity: check it"
+        if by_gravity is None:
+            return _stated(unit)._replace(why=doubt)
+        return by_gravity._replace(why=f"{by_gravity.why}; {doubt}")
+    if by_gravity is not None:
+        return by_gravity
+    return Scale(
+        "g",
+        size,
+        0.0,
+        f"counts of no usual range: the median of |f|, {size:.5g}, is taken for 1 g; correct counts_per_unit and bias",
+    )
+
+
+def median_size(v: Floats) -> float:
+    """Median length of vectors, shape (n, 3); NaN where none is finite."""
+    size = np.linalg.norm(v, axis=1)
+    size = size[np.isfinite(size)]
+    return float(np.median(size)) if len(size) else np.nan
+
+
+def is_gravity(size: float) -> bool:
+    """Whether a length is that of gravity, in a unit or in the counts of a usual range."""
+    return size > 0.0 and _by_gravity(size) is not None
+
+
+def _by_gravity(size: float) -> Scale | None:
+    """Find the unit in which the usual length of the force is gravity."""
     for one in _FORCE_UNITS:
         gravity = STANDARD_GRAVITY / parse_unit(one).factor
         if abs(size / gravity - 1.0) < _NEAR:
@@ -65,12 +104,7 @@ def accel_scale(f: Floats, unit: str) -> Scale:
     near = min(_COUNTS_PER_G, key=lambda counts: abs(np.log(size / counts)))
     if abs(size / near - 1.0) < _NEAR:
         return Scale("g", float(near), 0.0, f"counts, {near} a g: the median of |f| is {size:.5g}")
-    return Scale(
-        "g",
-        size,
-        0.0,
-        f"counts of no usual range: the median of |f|, {size:.5g}, is taken for 1 g; correct counts_per_unit and bias",
-    )
+    return None
 
 
 def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
@@ -85,32 +119,67 @@ def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
     unit : str
         By the headings; empty where they say none.
     """
+    if unit and _dimension_is(unit, "rad"):
+        return _stated(unit)
+    unit = unit if unit and _dimension_is(unit, "rad/s") else ""
+    factor, left = fit_of_turns(w, f_ib_b, rate_hz)
+    if factor is not None:
+        found = _turned(factor, left)
+        if not unit or abs(parse_unit(unit).factor / found.factor - 1.0) < _NEAR:
+            return _stated(unit) if unit else found
+        return found._replace(why=f"{found.why}; the headings say {unit}, with which the turns do not fit: check it")
     if unit:
-        return _stated(unit, "rad/s")
-    good = np.isfinite(w).all(axis=1) & np.isfinite(f_ib_b).all(axis=1)
+        return _stated(unit)
+    usual = median_size(w)
+    guess = "deg/s" if usual > _LARGEST_BIAS else "rad/s"
+    return Scale(
+        guess,
+        1.0,
+        0.0,
+        f"no turn tells their unit: {guess} stands in the map, as half of the rates are below {usual:.3g}; check it",
+    )
+
+
+_FACTORS = {1.0: ("rad/s", 1.0), DEGREE: ("deg/s", 1.0)} | {
+    DEGREE / counts: ("deg/s", float(counts)) for counts in _COUNTS_PER_DPS
+}
+"""SI of one number of gyros (rad/s), with the unit and the numbers of one unit."""
+
+
+def fit_of_turns(w: Floats, f: Floats, rate_hz: float) -> tuple[float | None, float]:
+    """Find the usual factor with which rates turn a force as it turns.
+
+    Parameters
+    ----------
+    w, f : ndarray, shape (n, 3)
+        In any unit; rows that are not finite are left out.
+
+    Returns
+    -------
+    factor : float or None
+        rad/s of one number; None where no turn tells it.
+    left : float
+        Share of the change of direction that is left.
+    """
+    good = np.isfinite(w).all(axis=1) & np.isfinite(f).all(axis=1)
+    if np.count_nonzero(good) < 2:
+        return None, 1.0
     t = np.arange(1, len(w) + 1) / rate_hz
-    tried = {1.0: ("rad/s", 1.0), DEGREE: ("deg/s", 1.0)} | {
-        DEGREE / counts: ("deg/s", float(counts)) for counts in _COUNTS_PER_DPS
-    }
-    factor, left = fitting_scale(t[good], w[good], f_ib_b[good], tuple(tried))
-    if factor is None:
-        usual = float(np.nanmedian(np.linalg.norm(w, axis=1)))
-        unit = "deg/s" if usual > _LARGEST_BIAS else "rad/s"
-        return Scale(
-            unit,
-            1.0,
-            0.0,
-            f"no turn tells their unit: {unit} stands in the map, as half of the rates are below {usual:.3g}; check it",
-        )
-    name, counts = tried[factor]
+    return fitting_scale(t[good], w[good], f[good], tuple(_FACTORS))
+
+
+def _turned(factor: float, left: float) -> Scale:
+    """Say a unit that the turns have told."""
+    name, counts = _FACTORS[factor]
     as_counts = "" if counts == 1.0 else f", counts, {counts:g} of them a unit"
     return Scale(
         name, counts, 0.0, f"in {name}{as_counts}: the turns then leave {left:.0%} of the change of gravity's direction"
     )
 
 
-def _stated(unit: str, expected: str) -> Scale:
-    del expected
-    if unit[:1].isdigit():
-        return Scale("deg/s", DEGREE / parse_quantity(unit, "deg/s"), 0.0, f"in {unit} by the headings")
+def _stated(unit: str) -> Scale:
     return Scale(unit, 1.0, 0.0, f"in {unit} by the headings")
+
+
+def _dimension_is(unit: str, *expected: str) -> bool:
+    return any(parse_unit(unit).dimension == parse_unit(one).dimension for one in expected)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,13 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
 from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale, gyro_scale
-from sdimu_calibration.storage.importing.columns import Pair, TimeColumn, pairs_by_heading, pairs_by_numbers, time_of
-from sdimu_calibration.storage.importing.text_table import TextTable, check_file
+from sdimu_calibration.storage.importing.columns import Pair, changes, pairs_by_heading, sensors_by_heading
+from sdimu_calibration.storage.importing.text_table import TextTable, check_file, column_text
+from sdimu_calibration.storage.importing.time_column import TimeColumn, time_of
+from sdimu_calibration.storage.importing.unnamed_columns import pairs_by_numbers
 
 _UNKNOWN_HZ = 100.0
 """Sample rate (Hz) that stands in a map of a file without times, to be corrected by the user."""
+_MOST_WITHOUT = 0.1
+"""Share of samples without a number in one of six columns that is told, and not in each file."""
+_LONGEST_SUFFIX = 40
+"""Number of characters of a heading that go into the name of a file."""
 
 
 @dataclass(frozen=True)
@@ -42,88 +51,125 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     ----------
     paths : sequence of Path
         Files of one form; the first one is looked at.
+
+    Raises
+    ------
+    DataError
+        The file holds no columns in text, or they cannot be told.
     """
     path = Path(paths[0])
     check_file(path)
-    if path.suffix.lower() == ".npz":
-        raise DataError(
-            f"{path}: a map can be proposed for columns in text only: write one ({_PAGE}) and state it with --map"
-        )
+    _refuse_arrays(path)
     table = TextTable(path)
     table.leave_out_broken()
-    pairs, by = pairs_by_heading(table.headings), "their headings"
-    numbers = _numbers(table)
-    if not pairs:
-        pairs, by = pairs_by_numbers(numbers), "their numbers: a triple of nearly constant length is the force"
+    numbers = table.numbers()
+    pairs, by = _pairs(table, numbers)
     if not pairs:
         shown = ", ".join(table.headings[:12]) or f"{numbers.shape[1]} columns without headings"
         raise DataError(
-            f"{path}: it is not clear which columns are the accelerometers and which the gyros ({shown}): write a map "
-            f"({_PAGE}) and state it with --map"
+            f"{path}: it is not clear which columns are the accelerometers and which the gyros ({shown}): {_WRITE}"
         )
-    time = time_of(table, numbers, pairs)
-    return [_proposal(path, table, numbers, pair, time, (by, len(pairs))) for pair in pairs]
+    time = time_of(table, numbers, [k for pair in pairs for k in (*pair.accel, *pair.gyro)])
+    suffixes = _suffixes([pair.name for pair in pairs])
+    return [_proposal(table, numbers, pair, time, (by, suffix)) for pair, suffix in zip(pairs, suffixes, strict=True)]
 
 
 _PAGE = "doc/recordings.md, Import"
+_WRITE = f"write a map ({_PAGE}) and name it by --map"
 
 
-def _numbers(table: TextTable) -> Floats:
-    """All columns as numbers; NaN where a column holds words.
+def _refuse_arrays(path: Path) -> None:
+    """Name the variables of a file of arrays, for the map that the user has to write."""
+    kind = path.suffix.lower()
+    arrays = read_npz(path) if kind == ".npz" else read_mat(path) if kind == ".mat" else None
+    if arrays is not None:
+        raise DataError(
+            f"{path}: a map is proposed for columns in text alone; here are the variables {arrays.contents()}: {_WRITE}"
+        )
 
-    Returns
-    -------
-    ndarray, shape (n, k)
-    """
-    rows = len(table.texts(1))
-    return np.column_stack([_column(table, column, rows) for column in range(1, table.width + 1)])
 
-
-def _column(table: TextTable, column: int, rows: int) -> Floats:
+def _pairs(table: TextTable, numbers: Floats) -> tuple[list[Pair], str]:
+    """Find the sensors, and say by what."""
+    accel, gyro = sensors_by_heading(table.headings)
     try:
-        return table.floats([column])[:, 0]
-    except DataError:
-        return np.full(rows, np.nan)
+        pairs = pairs_by_heading(table.headings, numbers, accel, gyro)
+    except DataError as error:
+        raise DataError(f"{table.path}: {error} ({_WRITE})") from error
+    if pairs:
+        return pairs, "their headings"
+    rate_hz = time_of(table, numbers).rate_hz or _UNKNOWN_HZ
+    by = "their numbers: a triple of nearly constant length is the force"
+    return pairs_by_numbers(numbers, rate_hz, accel, gyro), by
 
 
-def _proposal(
-    path: Path, table: TextTable, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, int]
-) -> Proposal:
-    by, count = found
+def _suffixes(names: Sequence[str]) -> list[str]:
+    """Make parts of names of files of the names of IMUs; none where there is one."""
+    if len(names) == 1:
+        return [""]
+    clean = [re.sub(r"\W", "", name)[:_LONGEST_SUFFIX] for name in names]
+    return [f"_{name}" if name and clean.count(name) == 1 else f"_imu{k}" for k, name in enumerate(clean, start=1)]
+
+
+def _proposal(table: TextTable, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]) -> Proposal:
+    by, suffix = found
+    path = table.path
+    names = [table.name_of(k) for k in (*pair.accel, *pair.gyro)]
+    doubts = [*([pair.doubt] if pair.doubt else []), *_doubts(table, numbers, (*pair.accel, *pair.gyro))]
     f, w = numbers[:, list(pair.accel)], numbers[:, list(pair.gyro)]
-    force = accel_scale(f, pair.accel_unit)
+    try:
+        force = accel_scale(f, pair.accel_unit)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
     rate_hz = time.rate_hz or _UNKNOWN_HZ
     rates = gyro_scale(w, f * force.factor, rate_hz, pair.gyro_unit)
-    names = [_name(table, k) for k in (*pair.accel, *pair.gyro)]
     words = [
-        f"{path}: accelerometers {', '.join(names[:3])} and gyros {', '.join(names[3:])}, by {by}",
+        f"{path}: accelerometers {_listed(names[:3])} and gyros {_listed(names[3:])}, by {by}",
         f"accelerometers: {force.why}",
         f"gyros: {rates.why}",
         f"time: {time.why}" + ("" if time.known else f"; rate_hz: {_UNKNOWN_HZ:g} stands in the map: correct it"),
+        *doubts,
         *table.notes,
     ]
-    if count > 1:
-        words.insert(0, f"{path}: {count} IMUs are in it, this is '{pair.name}'")
+    if suffix:
+        words.insert(0, f"{path}: several IMUs are in it, this is '{suffix[1:]}'")
     lines = [
         "# Proposed by sdimu import; look at every line before you use it.",
-        *(f"# {word}" for word in words),
+        *(f"# {one_line(word, None)}" for word in words),
         "format: sdimu-import/1",
+        *(['decimal: ","'] if table.decimal == "," else []),
         f"time: {time.text(rate_hz)}",
         *_sensor("accel", names[:3], force),
         *_sensor("gyro", names[3:], rates),
     ]
-    return Proposal(f"_{pair.name}" if count > 1 else "", "\n".join(lines) + "\n", tuple(words))
+    return Proposal(suffix, "\n".join(lines) + "\n", tuple(words))
 
 
-def _name(table: TextTable, column: int) -> str:
-    """Heading of a column, or its number where the heading does not name it alone."""
-    heading = table.headings[column] if column < len(table.headings) else ""
-    return heading if heading and table.headings.count(heading) == 1 else str(column + 1)
+def _doubts(table: TextTable, numbers: Floats, columns: Sequence[int]) -> list[str]:
+    """Say what speaks against six columns; refuse those that hold hardly a number."""
+    six, names = numbers[:, list(columns)], [table.name_of(k) for k in columns]
+    without = int(np.count_nonzero(~np.isfinite(six).all(axis=1)))
+    if 2 * without > len(six) or len(six) - without < 2:
+        # Where cells are no numbers this says which.
+        table.floats(names)
+        raise DataError(
+            f"{table.path}: {len(six) - without} of {len(six)} lines hold a number in all of the columns "
+            f"{_listed(names)}"
+        )
+    out = []
+    if without > _MOST_WITHOUT * len(six):
+        out.append(f"{without} of {len(six)} samples have no number in one of the six columns")
+    fixed = [name for name, moves in zip(names, changes(six), strict=True) if not moves]
+    if fixed:
+        out.append(f"the numbers in {_listed(fixed)} never change: look whether they are measured")
+    return out
 
 
-def _sensor(key: str, names: Sequence[str], scale: Scale) -> list[str]:
-    columns = ", ".join(name if name.isdecimal() else f'"{name}"' for name in names)
-    out = [f"{key}:", f"  columns: [{columns}]", f"  unit: {scale.unit}"]
+def _listed(names: Sequence[int | str]) -> str:
+    return ", ".join(map(str, names))
+
+
+def _sensor(key: str, names: Sequence[int | str], scale: Scale) -> list[str]:
+    out = [f"{key}:", f"  columns: [{', '.join(map(column_text, names))}]", f"  unit: {scale.unit}"]
     if scale.bias:
         out.append(f"  bias: {scale.bias:g}")
     if scale.counts != 1.0:
