@@ -229,7 +229,7 @@ def test_a_second_accelerometer_is_no_gyro(tmp_path, hand):
     f = hand.f_ib_b
     second = np.column_stack([hand.t, f, f + np.random.default_rng(2).normal(0.0, 0.02, f.shape)])
     for name, heading in (("a.csv", ""), ("b.csv", "t,acc_lo_x,acc_lo_y,acc_lo_z,acc_hi_x,acc_hi_y,acc_hi_z")):
-        with pytest.raises(DataError, match="are not to be told in it"):
+        with pytest.raises(DataError, match="it is not clear which columns"):
             propose_maps([write(tmp_path / name, heading, second)])
     heading = "t,acc_lo_x,acc_lo_y,acc_lo_z,acc_hi_x,acc_hi_y,acc_hi_z,gyro_x,gyro_y,gyro_z"
     path = write(tmp_path / "c.csv", heading, np.column_stack([second, hand.omega_ib_b]))

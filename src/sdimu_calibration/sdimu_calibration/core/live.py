@@ -16,7 +16,6 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import RawTest, in_order
-from sdimu_calibration.core.data.by_hand import why_handheld
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
@@ -24,6 +23,7 @@ from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.outcome import calibrate
