@@ -238,6 +238,17 @@ def test_a_second_accelerometer_is_no_gyro(tmp_path, hand):
     same(read_by(low, path), hand)
 
 
+def test_the_rates_of_a_single_turn_are_no_second_accelerometer(tmp_path):
+    t = np.arange(1500) * 0.01
+    angle = np.pi / 4.0 * (1.0 - np.cos(np.pi * np.clip((t - 6.0) / 2.0, 0.0, 1.0)))
+    force = 9.8 * np.column_stack([np.sin(angle), 0.0 * t, np.cos(angle)]) + RNG.normal(0.0, 0.01, (len(t), 3))
+    rate = np.column_stack([0.0 * t, np.gradient(angle, t), 0.0 * t]) + RNG.normal(0.003, 0.002, (len(t), 3))
+    path = write(tmp_path / "a.csv", "", np.column_stack([t, force, rate]))
+    (proposal,) = propose_maps([path])
+    np.testing.assert_allclose(read_by(proposal, path).f_ib_b, force, atol=1e-5)
+    assert "columns: [5, 6, 7]" in proposal.text
+
+
 def test_of_two_columns_of_one_name_the_one_that_is_measured_is_taken(tmp_path, hand):
     fixed = np.tile([0.0, 0.0, 9.8], (len(hand.t), 1))
     columns = np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b, fixed])
@@ -306,3 +317,15 @@ def test_arrays_are_listed_for_the_map_that_the_user_writes(tmp_path):
             propose_maps([tmp_path / name])
         assert listed in str(error.value)
         assert "--map" in str(error.value)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("value", [1e200, -1e308, np.inf])
+@pytest.mark.parametrize("column", [0, 1, 4])
+def test_numbers_beyond_all_measure_disturb_nothing(tmp_path, hand, value, column):
+    columns = np.column_stack([hand.t, hand.f_ib_b, hand.omega_ib_b])
+    columns[100::50, column] = value
+    (proposal,) = propose_maps([write(tmp_path / "a.csv", "", columns)])
+    assert "columns: [2, 3, 4]" in proposal.text
+    assert "columns: [5, 6, 7]" in proposal.text
+    assert "unit: s}" in proposal.text

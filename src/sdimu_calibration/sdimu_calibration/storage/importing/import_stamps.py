@@ -93,7 +93,7 @@ def lone_stamps(ns: Stamps) -> Ints:
     for _ in range(_PASSES):
         lone = _lone(ns[rows])
         if not lone.any():
-            left_out = np.setdiff1d(np.arange(len(ns)), rows)
+            left_out = np.delete(np.arange(len(ns)), rows)
             return left_out if len(left_out) <= max(1.0, MOST_BROKEN * len(ns)) else np.zeros(0, np.int64)
         rows = rows[~lone]
     return np.zeros(0, np.int64)
@@ -227,7 +227,8 @@ def _from_numbers(table: ArrayTable, column: int | str, unit: str) -> Stamps:
 
 
 def _scaled(table: Table, column: int | str, values: Floats, unit: str) -> Stamps:
-    ns = values * _ns_per(unit)
+    with np.errstate(over="ignore"):
+        ns = values * _ns_per(unit)
     good = np.isfinite(ns) & (np.abs(ns) < _LARGEST_NS)
     if not good.all():
         row = int(np.argmin(good))

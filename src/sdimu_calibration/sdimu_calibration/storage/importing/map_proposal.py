@@ -23,6 +23,8 @@ _UNKNOWN_HZ = 100.0
 """Sample rate (Hz) that stands in a map of a file without times, to be corrected by the user."""
 _MOST_WITHOUT = 0.1
 """Share of samples without a number in one of six columns that is told, and not in each file."""
+_LARGEST = 1e100
+"""Size of a number, in any unit, from which it is none that was measured: its square would be out of range."""
 _LONGEST_SUFFIX = 40
 """Number of characters of a heading that go into the name of a file."""
 
@@ -63,6 +65,7 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     table = TextTable(path)
     table.leave_out_broken()
     numbers = table.numbers()
+    numbers[~(np.abs(numbers) < _LARGEST)] = np.nan
     pairs, by = _pairs(table, numbers)
     if not pairs:
         shown = ", ".join(table.headings[:12]) or f"{numbers.shape[1]} columns without headings"

@@ -90,7 +90,7 @@ class TextTable:
         logged = _is_novatel(self._lines)
         if logged:
             self._lines = _as_table(self._lines)
-        self.decimal = decimal or decimal_of(_spread([line for line in self._lines if not _skipped(line)]), delimiter)
+        self.decimal = decimal or decimal_of([line for line in _spread(self._lines) if not _skipped(line)], delimiter)
         if decimal is None and self.decimal == ",":
             self.notes = (*self.notes, f"{path}: its numbers are read with a decimal comma; decimal in the map says it")
         self._begin = self._first_line() if skip_lines is None else skip_lines
@@ -216,8 +216,10 @@ class TextTable:
 
     def _data(self) -> list[str]:
         """Lines of data, as numpy reads them."""
-        lines = (line for line in self._lines[self._begin :] if not _skipped(line))
-        return [plain(line, self._delimiter, self.decimal) for line in lines]
+        lines = [line for line in self._lines[self._begin :] if not _skipped(line)]
+        # Most files need nothing; a call for each line would take longer than to read them.
+        pointed = self.decimal == "."
+        return [line if pointed and '"' not in line else plain(line, self._delimiter, self.decimal) for line in lines]
 
     def place(self, column: int | str) -> int:
         """Find the index of a column, from 0."""
@@ -261,9 +263,10 @@ class TextTable:
         """Say that many lines are left out: comments between the data, or numbers above them."""
         above = [line for line in self._lines[: self._begin] if not _skipped(line)]
         numbers = [cells for line in above if _mostly_numbers(cells := self._cells(line), self.decimal)]
-        filled = [line for line in self._lines[self._begin :] if line.strip()]
-        left_out = len(numbers) + sum(map(_skipped, filled))
-        lines = len(numbers) + len(filled)
+        skipped = [line for line in self._lines[self._begin :] if _skipped(line)]
+        blank = sum(not line.strip() for line in skipped)
+        left_out = len(numbers) + len(skipped) - blank
+        lines = len(numbers) + len(self._lines) - self._begin - blank
         if left_out > _MOST_LEFT_OUT * lines:
             self.notes = (
                 *self.notes,

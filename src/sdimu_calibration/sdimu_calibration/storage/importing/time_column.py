@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.storage.importing.import_stamps import is_date
 from sdimu_calibration.storage.importing.text_table import TextTable, column_text
 
@@ -89,18 +89,20 @@ def time_of(table: TextTable, numbers: Floats, taken: Sequence[int] = ()) -> Tim
 
 def ticks(values: Floats) -> bool:
     """Whether numbers, shape (n,), ascend by even steps."""
-    step = np.diff(values)
-    usual = float(np.median(step)) if len(step) else 0.0
-    return bool(len(step) and usual > 0.0 and _near(step, usual).mean() > 0.5)
+    step, usual = _steps(values)
+    return usual > 0.0 and bool((np.abs(step - usual) <= max(_EVEN * usual, 1e-12)).mean() > 0.5)
 
 
 def counts(values: Floats) -> bool:
     """Whether numbers, shape (n,), go up by one, as the index of a row does."""
-    return ticks(values) and bool((values == np.rint(values)).all()) and float(np.median(np.diff(values))) == 1.0
+    step, usual = _steps(values)
+    return usual == 1.0 and ticks(values) and bool((step == np.rint(step)).all())
 
 
-def _near(step: Floats, usual: float) -> Bools:
-    return np.asarray(np.abs(step - usual) <= max(_EVEN * usual, 1e-12))
+def _steps(values: Floats) -> tuple[Floats, float]:
+    """Return the steps between the numbers of a column, and the usual one; 0 where there is none."""
+    step = np.diff(values[np.isfinite(values)])
+    return step, float(np.median(step)) if len(step) else 0.0
 
 
 def _clock(table: TextTable, k: int, values: Floats) -> TimeColumn | None:
@@ -109,9 +111,7 @@ def _clock(table: TextTable, k: int, values: Floats) -> TimeColumn | None:
     if not np.isfinite(values).any():
         dates = is_date(str(table.texts(k + 1)[0]))
         return TimeColumn(column, "iso8601", 0.0, f"column {column} holds dates") if dates else None
-    step = np.diff(values)
-    step = step[np.isfinite(step)]
-    usual = float(np.median(step)) if len(step) else 0.0
+    _, usual = _steps(values)
     if usual <= 0.0:
         return None
     rates = {unit: 1.0 / (usual * seconds) for unit, seconds in _SECONDS.items()}

@@ -20,8 +20,9 @@ _STEADY = 0.5
 """Scatter of the length of a triple over its median from which it is no force: a hand that turns an IMU makes less."""
 _STEADY_REST = 0.05
 """Scatter (1) below which a triple of the size of gravity is a second accelerometer: gyros at rest scatter more."""
-_SAME = 0.5
-"""Share of the change of a triple that a force explains (1) from which it is a force, too: rates are none of it."""
+_SAME = 0.95
+"""Share of the change of two triples that each explains of the other (1) from which both are forces: a force may
+explain the rates of a single turn, but they do not explain it."""
 _MOST_FORCES = 4
 """Number of triples that are tried as the force, the steadiest first: each is tried with all others."""
 _LOOKED_AT = 200_000
@@ -84,8 +85,14 @@ def _is_force_too(f: Floats, v: Floats) -> bool:
     if _unsteady(v) < _STEADY_REST and is_gravity(median_size(v)):
         return True
     force, other = (x[good] - x[good].mean(axis=0) for x in (f, v))
-    left = other - force @ np.linalg.lstsq(force, other, rcond=None)[0]
-    return bool(np.sum(left**2) < (1.0 - _SAME) * np.sum(other**2))
+    return min(_explained(force, other), _explained(other, force)) > _SAME
+
+
+def _explained(x: Floats, y: Floats) -> float:
+    """Share of the change of y that is a linear function of x; both of shape (n, 3), without their means."""
+    left = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+    total = float(np.sum(y**2))
+    return 1.0 - float(np.sum(left**2)) / total if total > 0.0 else 1.0
 
 
 def _by_turns(numbers: Floats, rate_hz: float, pairs: Sequence[tuple[Three, Three]]) -> list[Pair]:
