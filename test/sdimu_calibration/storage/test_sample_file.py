@@ -54,5 +54,5 @@ def test_a_full_temporary_folder_is_one_line(monkeypatch):
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(imu_messages, "TemporaryFile", lambda **_: Full())
-    with pytest.raises(DataError, match="set TMPDIR"):
+    with pytest.raises(DataError, match="TMPDIR"):
         SampleFile().append([(np.zeros(1, np.int64), np.zeros((1, 3)), np.zeros((1, 3)))])
