@@ -43,8 +43,18 @@ def forces_ahead(Q: Floats, white: Floats, sigma: Floats, k: int) -> ForcesAhead
     total, error, scatter = 0.0, np.zeros((k, 3)), np.zeros((k, 3))
     for i in range(k):
         at = slice(6 * i + 3, 6 * i + 6)
-        inverse = np.linalg.inv(np.eye(3) - Q[at] @ Q[at].T)
+        inverse = _inverse(np.eye(3) - Q[at] @ Q[at].T)
         ahead = inverse @ white[at]
         total += float(white[at] @ ahead)
         error[i], scatter[i] = sigma[at] * ahead, sigma[at] * np.sqrt(np.diag(inverse))
     return ForcesAhead(float(np.sqrt(total / (3 * k))), error, scatter)
+
+
+def _inverse(rest: Floats) -> Floats:
+    """Invert ``I - H``, shape (3, 3), where a rest alone may tell a coefficient: what is left of it is rounding."""
+    size, axes = np.linalg.eigh(rest)
+    return np.asarray((axes / np.maximum(size, _LEAST_LEFT)) @ axes.T)
+
+
+_LEAST_LEFT = 1e-12
+"""Least share of a force (1) that the others do not predict: below it is the rounding of the factor."""
