@@ -84,3 +84,23 @@ def test_an_equation_in_the_rate_may_be_as_large_in_a_turn_as_a_bias_is(text):
     (effect,) = find_effects(text)
     for grade, bias in registry.get("accel_bias").prior.items():
         assert effect.prior[grade] * np.radians(2.0) == pytest.approx(bias)
+
+
+@pytest.mark.parametrize("formula", ["0 wx", "0", "wx - wx", "0 * ax^2"])
+def test_an_equation_that_is_zero_is_refused(formula):
+    with pytest.raises(DataError, match="is zero, whatever its variables are"):
+        find_effects(f"gyro_x: {formula}")
+
+
+def test_an_equation_that_is_zero_for_one_sign_alone_is_an_effect():
+    assert len(find_effects("gyro_x: abs(wx) - wx")) == 1
+
+
+def test_a_parameter_of_a_file_that_is_multiplied_by_zero_is_refused(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "format: sdimu-effect/1\nname: mine\nexpressions: {gyro_x: k * wx + 0 * q * wy}\n"
+        "parameters:\n  k: {unit: ppm, prior: 1 ppm}\n  q: {unit: ppm, prior: 1 ppm}\n"
+    )
+    with pytest.raises(DataError, match=r"mine\.yaml: parameters\.q: what it is multiplied by is zero"):
+        find_effects(str(path))

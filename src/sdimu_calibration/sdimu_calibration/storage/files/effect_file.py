@@ -44,6 +44,7 @@ from sdimu_calibration.storage.files.effect_schema import (
     prior_of,
     read_effect_file,
     si_unit,
+    vanishes,
 )
 
 ENTRY_POINTS = "sdimu_calibration.effects"
@@ -125,6 +126,8 @@ def _equation(sensor: str, formula: str) -> Effect:
     try:
         about = parse_expression(equation_text(formula), frozenset(VARIABLES))
         dimension = about.dimension(VARIABLE_UNITS)
+        if vanishes(about, {}):
+            raise DataError("is zero, whatever its variables are; name what the error grows with")
         below = reciprocal_unit(dimension)
         usual = USUAL_TURN ** max(0, -int(dimension.get("s", 0))) if "m" not in dimension else 1.0
         file = EffectFile.model_validate(

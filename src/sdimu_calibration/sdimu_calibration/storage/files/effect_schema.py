@@ -76,7 +76,18 @@ def formulas_of(file: EffectFile) -> dict[str, Expression]:
     for name in file.parameters:
         if not any(name in formula.names for formula in formulas.values()):
             raise DataError(f"parameters.{name}: no expression uses it (use it in one, or leave it out)")
+        alone = constants | {other: float(other == name) for other in file.parameters}
+        if all(vanishes(formula, alone) for formula in formulas.values()):
+            raise DataError(f"parameters.{name}: what it is multiplied by is zero, whatever the variables are")
     return formulas
+
+
+def vanishes(formula: Expression, fixed: Mapping[str, float]) -> bool:
+    """Whether a formula is exactly zero at random values of its variables, of both signs, with all others `fixed`."""
+    rng = np.random.default_rng(8)
+    with np.errstate(all="ignore"):
+        found = formula.evaluate({name: rng.uniform(-1.5, 1.5, 16) for name in VARIABLES} | dict(fixed))
+    return not np.any(found)
 
 
 def _formula(file: EffectFile, sensor: str, text: str, known: frozenset[str], usual: Mapping[str, float]) -> Expression:
