@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import resource
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -248,6 +249,57 @@ def test_a_full_disk_is_told_with_the_file_that_was_to_be_written(tmp_path, monk
     assert ending.value.code == 1
     assert capsys.readouterr().err == f"sdimu: {tmp_path / 'result.json'}: No space left on device\n"
     assert names(tmp_path) == []
+
+
+LONGEST = 4096
+"""Bytes that a file may have in the test of a full disk."""
+
+
+@pytest.fixture
+def small_disk():
+    """Let the system refuse a file longer than `LONGEST`, as a full disk does."""
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LONGEST, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def _together(folder):
+    with written_together(folder) as part:
+        write_whole(part / "result.json", "x" * 2 * LONGEST)
+
+
+def _bag(folder):
+    rng = np.random.default_rng(1)
+    ns = np.arange(1, 1001) * 10_000_000
+    samples = {"omega_ib_b": rng.standard_normal((1000, 3)), "f_ib_b": rng.standard_normal((1000, 3))}
+    write_recording(folder, start_ns=10**18, imu_ns=ns, **samples)
+
+
+WORKS = {"file": lambda path: write_whole(path, "x" * 2 * LONGEST), "files": _together, "bag": _bag}
+
+
+@pytest.mark.usefixtures("small_disk")
+@pytest.mark.parametrize("work", WORKS)
+def test_a_full_disk_leaves_no_folder_that_was_made_for_nothing(tmp_path, work):
+    (tmp_path / "there").mkdir()
+    for place in (tmp_path / "new" / "deeper" / "x", tmp_path / "there" / "new" / "x"):
+        with pytest.raises((OSError, DataError)):
+            WORKS[work](place)
+    assert names(tmp_path) == ["there"]
+    assert names(tmp_path / "there") == []
+
+
+def test_a_folder_that_was_made_stays_where_another_has_written_into_it(tmp_path):
+    def work():
+        with written_together(tmp_path / "new") as part:
+            (part.parent / "of another").touch()
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        work()
+    assert names(tmp_path / "new") == ["of another"]
 
 
 def test_a_file_is_put_aside_where_nothing_else_is(tmp_path):

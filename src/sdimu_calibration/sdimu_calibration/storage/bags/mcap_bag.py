@@ -17,7 +17,7 @@ from sdimu_calibration.storage.bags.bag_folder import check_room, put_in_place
 from sdimu_calibration.storage.bags.bag_metadata import FileEntry, TopicEntry, write_metadata
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.message_definition import definition, type_hash
-from sdimu_calibration.storage.files.whole_file import beside
+from sdimu_calibration.storage.files.whole_file import beside, missing_folders, remove_empty
 
 # No profile: every player takes its defaults.
 _OFFERED_QOS = "[]"
@@ -57,18 +57,23 @@ class McapBag:
         self._replace = replace
         self._custom = custom
         self._folder = beside(self.path)
+        self._made = missing_folders(self.path.parent)
         self._file_name = f"{self.path.name}_0.mcap"
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[str, int] = {}
         self._first_ns: int | None = None
         self._last_ns = 0
         self._failed = False
-        with self._told():
-            self._folder.mkdir(parents=True)
-            if live:
-                put_in_place(self._folder, self.path, replace)
-                self._folder = self.path
-            self._stream = (self._folder / self._file_name).open("wb")
+        try:
+            with self._told():
+                self._folder.mkdir(parents=True)
+                if live:
+                    put_in_place(self._folder, self.path, replace)
+                    self._folder = self.path
+                self._stream = (self._folder / self._file_name).open("wb")
+        except BaseException:
+            self._remove()
+            raise
         try:
             with self._told():
                 self._writer = McapFile(self._stream)
@@ -177,8 +182,13 @@ class McapBag:
         """Leave nothing of the bag; a live one stays as it is, cut."""
         with suppress(OSError):
             self._stream.close()
+        self._remove()
+
+    def _remove(self) -> None:
+        """Take away what is not in its place, and folders that were made for it."""
         if self._folder != self.path:
             shutil.rmtree(self._folder, ignore_errors=True)
+            remove_empty(self._made)
 
     def __enter__(self) -> McapBag:
         return self

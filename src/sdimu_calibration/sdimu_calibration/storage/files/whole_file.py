@@ -9,7 +9,7 @@ import secrets
 import shutil
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -51,6 +51,30 @@ def put_aside(path: Path) -> Path | None:
     return path.rename(free_beside(path)) if path.is_file() else None
 
 
+def missing_folders(folder: Path) -> tuple[Path, ...]:
+    """Return the folders that are to be made for `folder`, itself first, as `remove_empty` takes them away again."""
+    return tuple(path for path in (folder, *folder.parents) if not path.exists())
+
+
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Remove folders that were made for work that failed, the innermost first; one that holds something stays."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make a folder for what is written into it; it goes again where nothing could be."""
+    new = missing_folders(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        remove_empty(new)
+        raise
+
+
 def write_whole(path: Path, text: str) -> None:
     """Write a text file beside its place and rename it: a reader never meets half of it; its folder is made too.
 
@@ -62,17 +86,17 @@ def write_whole(path: Path, text: str) -> None:
     path = Path(path)
     if path.is_dir():
         raise DataError(f"{path}: is a folder; name a file to write")
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = beside(path)
-    try:
-        # A path may hold bytes that are no text; written so, JSON gives them back.
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
-        temporary.replace(path)
-    except OSError as error:
-        # A full disk names no file, and the hidden one says nothing to a reader.
-        raise _named(error, path) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    with _made(path.parent):
+        try:
+            # A path may hold bytes that are no text; written so, JSON gives them back.
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+            temporary.replace(path)
+        except OSError as error:
+            # A full disk names no file, and the hidden one says nothing to a reader.
+            raise _named(error, path) from None
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -92,9 +116,14 @@ def written_together(folder: Path) -> Iterator[Path]:
         Empty folder inside `folder`.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     part = beside(folder / "run")
-    part.mkdir()
+    with _made(folder):
+        part.mkdir()
+        yield from _together(part, folder)
+
+
+def _together(part: Path, folder: Path) -> Iterator[Path]:
+    """Yield the folder `part`; what is then in it goes into `folder`."""
     try:
         yield part
         with _locked(folder), uninterrupted():
