@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.options import BagArgument, JsonOption
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.plain_text import one_line
+from sdimu_calibration.shell_words import joined
 
 app = typer.Typer(
     help="Look into a recording, take a part of it, or mend one that was cut short.", no_args_is_help=True
@@ -31,7 +31,7 @@ def info(bag: BagArgument, as_json: JsonOption = False) -> None:
     console.print(f"{(content.last_ns - content.first_ns) * 1e-9:.1f} s from {content.first_ns * 1e-9:.3f} s")
     for part in content.damaged:
         say(console, f"{part} is cut short or damaged; to mend it:")
-        command(console, shlex.join(["sdimu", "bag", "recover", str(bag)]))
+        command(console, joined(["sdimu", "bag", "recover", str(bag)]))
     topics = {topic: {"type": name, "messages": content.counts[topic]} for topic, name in content.types.items()}
     damaged = [str(part) for part in content.damaged]
     span = {"first_ns": content.first_ns, "last_ns": content.last_ns}

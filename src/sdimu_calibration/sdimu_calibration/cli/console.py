@@ -56,8 +56,8 @@ def pair(console: Console, name: str, text: str, width: int) -> None:
 
 
 def command(console: Console, text: str) -> None:
-    """Print a command to paste: on a line of its own, which is never broken."""
-    console.print(f"  {one_line(text, None)}", soft_wrap=True, highlight=False)
+    """Print a command to paste, as `shell_words.joined` writes it: on a line of its own, which is never broken."""
+    console.print(f"  {printable(text)}", soft_wrap=True, highlight=False)
 
 
 def answer(content: Path | Mapping[str, Any], asked: bool) -> None:

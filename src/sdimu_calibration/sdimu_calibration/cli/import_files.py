@@ -10,6 +10,7 @@ import typer
 
 from sdimu_calibration.cli.console import command, plain, say
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -95,13 +96,11 @@ def _set_of(console: Console, folder: Path, bags: Sequence[Path], replace: bool)
     path = folder / "set.yaml"
     write_set(path, bags, replace=replace)
     say(console, f"{path}: {len(bags)} recordings; to calibrate them together:")
-    command(console, f"sdimu calibrate --set {path}")
+    command(console, joined(["sdimu", "calibrate", "--set", str(path)]))
 
 
 def _propose(console: Console, files: Sequence[Path], out: Path | None, replace: bool) -> None:
     """Write maps that probably fit, and say how to go on."""
-    import shlex
-
     from sdimu_calibration.storage.bags.file_room import check_no_source
     from sdimu_calibration.storage.importing.map_proposal import propose_maps
 
@@ -117,4 +116,4 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
         bag = out or Path(f"{files[0].stem}{proposal.suffix}_bag")
         say(console, f"{path}: the map that is proposed; look at it, then:")
         words = ["sdimu", "import", *map(str, files), "--map", str(path), "--out", str(bag)]
-        command(console, shlex.join(words))
+        command(console, joined(words))

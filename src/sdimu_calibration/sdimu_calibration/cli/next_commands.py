@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from sdimu_calibration.cli.console import command, say
 from sdimu_calibration.cli.option_groups import words_by_option, words_of
 from sdimu_calibration.cli.options import Fitted, Place
 from sdimu_calibration.core.advice import Verb
+from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.files.advice_words import added, lead, plan_options
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Asked:
 
     def command(self, verb: str) -> str:
         """Write the command of a verb about the same recording, with the same options."""
-        return shlex.join(["sdimu", verb, *map(str, self.bags), *self.options])
+        return joined(["sdimu", verb, *map(str, self.bags), *self.options])
 
 
 def spelled(advice: Advice, asked: Asked) -> str:
@@ -79,9 +79,9 @@ def spelled(advice: Advice, asked: Asked) -> str:
     if advice.verb == Verb.DIAGNOSE:
         return replace(asked, bags=asked.bags[:1]).command("diagnose")
     if advice.verb == Verb.CONTINUE:
-        return shlex.join(["sdimu", "plan", "--after", str(asked.folder)])
+        return joined(["sdimu", "plan", "--after", str(asked.folder)])
     if advice.verb in {Verb.REVERSE_PLAN, Verb.RANK_TURNS}:
-        return f"sdimu plan {shlex.join(['--plan', str(asked.folder / PLAN), *asked.place])} {plan_options(advice)}"
+        return f"sdimu plan {joined(['--plan', str(asked.folder / PLAN), *asked.place])} {plan_options(advice)}"
     return ""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +15,7 @@ from sdimu_calibration.cli.options import BagArgument, JsonOption, Recorded, res
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def noise(
     told = "--imu" if opening.imu is not None else "proposed by the rests; --imu states another"
     say(console, f"note: grade and priors in imu.yaml are those of '{imu}' ({told})")
     say(console, f"results in {folder}; to use them:")
-    command(console, shlex.join(["sdimu", "calibrate", str(bag), "--imu", str(folder / "imu.yaml"), *place]))
+    command(console, joined(["sdimu", "calibrate", str(bag), "--imu", str(folder / "imu.yaml"), *place]))
     answer(folder / "noise.json", as_json)
 
 

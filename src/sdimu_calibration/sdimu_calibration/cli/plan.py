@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effect_key import read_quantity
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.shell_words import joined
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -234,7 +234,7 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
         f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, {reached}, {found.tried} "
         f"plans tried; in {out}. To look at it:",
     )
-    command(console, shlex.join(["sdimu", "predict", "--plan", str(out), "--imu", asked.imu, "--site", asked.site]))
+    command(console, joined(["sdimu", "predict", "--plan", str(out), "--imu", asked.imu, "--site", asked.site]))
     answer(_content(start, known, first, found, limits, out), request.as_json)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import shlex
 import socket
 import threading
 import time
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.shell_words import quoted
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -177,7 +177,7 @@ def ended(folder: str, more: str = "") -> End:
 
     parts = ["the test has ended", *([f"results in {folder}"] if folder else []), *([more] if more else [])]
     words = "; ".join(parts)
-    command = f"xdg-open {shlex.quote(str(Path(folder) / 'report.html'))}" if folder else ""
+    command = f"xdg-open {quoted(str(Path(folder) / 'report.html'))}" if folder else ""
     return End(True, f"{words[:1].upper()}{words[1:]}.", command)
 
 

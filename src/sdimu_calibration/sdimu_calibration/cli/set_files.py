@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.shell_words import joined
 
 app = typer.Typer(help="Say which recordings are of one unit, for calibrate and diagnose --set.", no_args_is_help=True)
 
@@ -43,4 +44,5 @@ def init(
     write_set(path, found, Said(serial or "", power_on or ""), replace=replace)
     missing = " and ".join(word for word, said in (("serial", serial), ("power_on", power_on)) if said is None)
     then = f"complete {missing}, then" if missing else "now"
-    plain().print(f"{path}: {len(found)} recordings; {then}: sdimu calibrate --set {path}", soft_wrap=True)
+    using = joined(["sdimu", "calibrate", "--set", str(path)])
+    plain().print(f"{path}: {len(found)} recordings; {then}: {using}", soft_wrap=True)

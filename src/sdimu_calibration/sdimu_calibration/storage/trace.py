@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
 from sdimu_calibration.storage.files.datasheet_file import file_hashes
 
@@ -56,7 +56,7 @@ def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: s
     return Trace(
         datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         f"sdimu {program_version()}",
-        shlex.join(["sdimu", *arguments]) if arguments else "",
+        joined(["sdimu", *arguments]) if arguments else "",
         tuple((key, str(value)) for key, value in named.items() if value),
         tuple(files),
     )

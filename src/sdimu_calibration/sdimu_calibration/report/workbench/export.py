@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import shlex
 import tempfile
 import zipfile
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.workbench.parts import span
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State
+from sdimu_calibration.shell_words import quoted
 from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_calibration.storage.files.result_file import write_result
 
@@ -73,7 +73,7 @@ def command(setting: Setting, bag: str, options: Sequence[str] = ()) -> str:
     options : sequence of str
         Words that say how it is opened.
     """
-    out = ["sdimu", "calibrate", shlex.quote(bag), "--model", "model.yaml", *map(shlex.quote, options)]
+    out = ["sdimu", "calibrate", quoted(bag), "--model", "model.yaml", *map(quoted, options)]
     if setting.held:
         out += ["--exclude-stops", ",".join(map(str, setting.held))]
     if setting.cut:

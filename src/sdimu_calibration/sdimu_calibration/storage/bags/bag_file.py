@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.bags.bag_metadata import named_files, read_metadata
 from sdimu_calibration.storage.bags.mcap_walk import MAGIC, DamagedError, McapWalk, Messages
 from sdimu_calibration.storage.bags.own_process import run
@@ -225,7 +226,8 @@ def _read_mcap(
     except DamagedError as error:
         if bag not in {part.parent, part}:
             raise DataError(f"{bag}: a file in it is cut short or damaged ({error})") from error
-        raise DataError(f"{part}: the file is cut short or damaged ({error}); run: sdimu bag recover {part}") from error
+        mend = joined(["sdimu", "bag", "recover", str(part)])
+        raise DataError(f"{part}: the file is cut short or damaged ({error}); run: {mend}") from error
     except UnpackError as error:
         raise DataError(f"{bag}: a message cannot be unpacked ({error})") from error
     for key, channel in walk.channels.items():
