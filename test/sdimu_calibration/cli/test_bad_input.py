@@ -96,6 +96,16 @@ def test_a_number_out_of_range_is_wrong_usage(ended, line, option):
     assert option in err
 
 
+@pytest.mark.parametrize("line", ["WORD", "predict --out FILE", "bag cut BAG --out new --from WORD"])
+def test_wrong_usage_shows_no_endless_word(ended, tmp_path, line):
+    folder = tmp_path / "/".join(["a" * 200] * 12)
+    folder.mkdir(parents=True)
+    (folder / "file").touch()
+    status, err = ended(line.replace("WORD", "a" * 5000).replace("FILE", str(folder / "file")))
+    assert status == 2
+    assert len(err) < 1500
+
+
 def test_a_cut_to_any_time_ends_with_the_recording(bag, tmp_path):
     assert cut_bag(bag, tmp_path / "a", 0.0, 1e300).counts == cut_bag(bag, tmp_path / "b", 0.0, float("inf")).counts
 

@@ -50,6 +50,8 @@ _VERBS = {
 }
 _LIKE = 0.6
 """Share of letters (1) from which a verb looks like what was typed: one letter more, less or other."""
+_LONGEST_VERB = 60
+"""Number of characters of a verb that is none (1) that a message shows."""
 _MORE = "More"
 """Where verbs of other packages stand that have no place above."""
 
@@ -73,8 +75,16 @@ class Verbs(TyperGroup):
         if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
             near = get_close_matches(args[0], self.list_commands(ctx), n=3, cutoff=_LIKE)
             hint = f"did you mean {', '.join(near)}?" if near else "sdimu --help lists them"
-            ctx.fail(f"no verb '{args[0]}'; {hint}")
+            ctx.fail(f"no verb '{one_line(args[0], _LONGEST_VERB)}'; {hint}")
         return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb; what is wrong with its options is told in a few lines, however long a word is."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = one_line(error.message)
+            raise
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""
