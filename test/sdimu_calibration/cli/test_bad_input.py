@@ -37,6 +37,7 @@ UNUSABLE = (
     ("plan --acceleration nan", "--acceleration nan"),
     ("plan --acceleration 0", "--acceleration 0"),
     ("plan --acceleration -5", "--acceleration -5"),
+    ("plan --acceleration 1e-3", "--acceleration 0.001: too low for every turn of kim18: at a mean of 2 deg/s"),
     ("plan --tell gyro_bias_x --tell gyro_bias_x", "gyro_bias_x: named twice"),
     ("plan --backwards --out folder.yaml", "folder.yaml: is a folder"),
     ("predict --mount 1e300", "--mount '1e300'"),

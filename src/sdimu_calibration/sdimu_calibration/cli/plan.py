@@ -93,6 +93,18 @@ class Allowed:
         rates, dwells = self.rates_rad_s, tuple(_numbers("--dwells", self.dwells, _MOST_DWELL))
         return Abilities(rates, self.acceleration_rad_s2, dwells)
 
+    def check_turns(self, start: Plan) -> None:
+        """Raise DataError where the acceleration allows no turn of a plan, at the slowest of the rates either."""
+        slowest = min(self.rates_rad_s)
+        # A turn that speeds up over its first half and slows down over the other needs the least.
+        least = min((4.0 * slowest**2 / abs(turn.angle_rad) for turn in start.turns), default=0.0)
+        if least > self.acceleration_rad_s2:
+            raise DataError(
+                f"--acceleration {self.acceleration:g}: too low for every turn of {start.name}: at a mean of "
+                f"{math.degrees(slowest):g} deg/s (--rates) they need {math.degrees(least):.2g} deg/s^2 and more; "
+                "state what the table can do, or slower --rates"
+            )
+
 
 @dataclass(frozen=True)
 class PlanRequest:
@@ -203,6 +215,7 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
 
     start, before, out = asked.start, asked.before, request.out
     able, minutes = allowed.abilities, allowed.minutes
+    allowed.check_turns(start)
     with bar(console) as progress:
         first = bounds(start, asked.question)
         usual = {} if before else {e: allowed.slack * sigma for e, sigma in first.largest().items()}
