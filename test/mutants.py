@@ -93,6 +93,13 @@ MUTANTS = (
         "        var_u = np.diagonal(inverse - gain",
         (f"{TESTS}/joint",),
     ),
+    Mutant("joint/set_board.py", "_Share(J - B.T @ X", "_Share(J + B.T @ X", (f"{TESTS}/joint/test_set_board.py",)),
+    Mutant(
+        "joint/rival_noises.py",
+        "    explained -= float(2.0 * d @ point",
+        "    explained += float(2.0 * d @ point",
+        (f"{TESTS}/joint/test_set_board.py",),
+    ),
     Mutant("earth.py", "linear * height + 3.0", "linear * height - 3.0", (f"{TESTS}/test_earth.py",)),
 )
 
