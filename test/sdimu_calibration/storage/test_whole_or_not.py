@@ -274,7 +274,7 @@ def _bag(folder):
     rng = np.random.default_rng(1)
     ns = np.arange(1, 1001) * 10_000_000
     samples = {"omega_ib_b": rng.standard_normal((1000, 3)), "f_ib_b": rng.standard_normal((1000, 3))}
-    write_recording(folder, start_ns=10**18, imu_ns=ns, **samples)
+    write_recording(folder, BagContent(start_ns=10**18, imu_ns=ns, **samples))
 
 
 WORKS = {"file": lambda path: write_whole(path, "x" * 2 * LONGEST), "files": _together, "bag": _bag}
