@@ -123,7 +123,7 @@ ANSWERS = {
     "effects": (("effects",), "sdimu-catalogue/1"),
     "effect": (("effects", "gyro_scale"), "sdimu-catalogue/1"),
     "predict": (("predict", "--plan", "small.yaml"), "sdimu-prediction/1"),
-    "plan": (("plan", "--plan", "small.yaml", "--tries", 2), "sdimu-plan-search/1"),
+    "plan": (("plan", "--plan", "small.yaml", "--tries", 2, "--replace"), "sdimu-plan-search/1"),
     "tell": (
         ("plan", "--plan", "small.yaml", "--tell", EFFECT, "--tell", "gyro_scale_quadratic_y"),
         "sdimu-next-turn/1",
