@@ -48,7 +48,7 @@ def test_noises_of_one_recording_are_as_likely_as_its_own_board_says():
     for one in rivals:
         # The prior of what the recording has for itself is common to all noises.
         assert log_likelihood(one, evidence.weight[:p], p) - white == pytest.approx(
-            board.likelihood(one.noise), rel=1e-4, abs=1e-2
+            board.likelihood(one.noise), rel=1e-8, abs=1e-5
         )
 
 
