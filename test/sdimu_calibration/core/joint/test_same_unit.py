@@ -95,6 +95,19 @@ def test_coefficients_whose_spread_the_imu_file_does_not_state_say_nothing(repor
     check_one_unit([*bare[:2], replace(bare[2], values=values)])
 
 
+def test_a_prior_that_one_recording_widened_tells_no_units_apart(reports):
+    """A short test about one axis may end at a hundred times the prior, and state a small sigma there."""
+    short_one, name = reports[2], "gyro_mass_unbalance_dx"
+    own, rows = short_one.names.index(name), short_one.reduction.names.index(name)
+    values, sigma, weight = short_one.values.copy(), short_one.sigma.copy(), short_one.reduction.weight.copy()
+    values[own], sigma[own] = 200.0 / np.sqrt(weight[rows]), 2.0 / np.sqrt(weight[rows])
+    far = replace(short_one, values=values, sigma=sigma)
+    with pytest.raises(DataError, match=f"two units.*most {name}"):
+        check_one_unit([reports[0], far])
+    weight[rows] = (3.0 * values[own]) ** -2.0
+    check_one_unit([reports[0], replace(far, reduction=replace(far.reduction, weight=weight), widened=True)])
+
+
 def as_calibrated(like: Report, imu: str, unit: int, recording: int, axes=AS_GIVEN) -> Report:
     """Report of a unit of an IMU file whose heading stays open: its truth with errors of a hundredth of the priors."""
     spec = load_imu(imu)

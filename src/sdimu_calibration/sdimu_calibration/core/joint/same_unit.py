@@ -1,8 +1,8 @@
 """Are the recordings of a set those of one unit? Scale factors, misalignments and the like stay with a unit.
 
-Two units differ in them by what the IMU file states, s of each coefficient; one unit by a fraction of it from recording
-to recording. With d the difference of a recording from the others and v the variance of d by the noise, the log odds
-that it is another unit are
+Two units differ in them by what the IMU file states, s of each coefficient (more where a recording widened it); one
+unit by a fraction of it from recording to recording. With d the difference of a recording from the others and v the
+variance of d by the noise, the log odds that it is another unit are
 
     sum of log N(d; 0, v + 2 s^2) - log N(d; 0, v + 2 (share s)^2)
 
@@ -22,6 +22,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.axes_and_units import ROTATIONS, axes_in_words
 from sdimu_calibration.core.effects.body_frame import TRIAD_NAMES, read_in_axes
 from sdimu_calibration.core.effects.registry import get, names
+from sdimu_calibration.core.joint.joint_prior import prior_weight
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
@@ -102,7 +103,10 @@ def _read_in(report: Report, axes: Floats) -> Report:
 
 def _log_odds(report: Report, others: Sequence[Report]) -> tuple[float, str, str]:
     """Log odds that a recording is of another unit than others; the coefficient that says most, and its difference."""
-    spread = dict(zip(report.reduction.names, report.reduction.weight.tolist(), strict=True))
+    every = (report, *others)
+    held = tuple(dict.fromkeys(name for r in every for name in r.reduction.names))
+    # What widened a prior in one recording may be an error of its fit: there nothing so wide tells units apart.
+    spread = dict(zip(held, prior_weight(every, held).tolist(), strict=True))
     # What a grade may have says little of how its units differ: many have nothing of it, and then agree in it.
     effects = [e for e in map(get, names()) if e.scope == "unit" and (e.family or e.name) in report.imu.prior]
     stable = {p.name: p.display_unit for e in effects for p in e.parameters}
