@@ -17,6 +17,7 @@ from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
 from sdimu_calibration.core.data.strays import stamp_text, strays
+from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
@@ -253,12 +254,14 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
 
 def in_order(raw: RawTest) -> Recording:
     """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample."""
+    came = len(raw.ns)
+    raw, streams = _of_one_sensor(raw)
     bursts = _bursts(raw)
     steps = find_steps(raw.ns, raw.omega_ib_b, raw.f_ib_b) if bursts is None else ()
     raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    notes = [*([] if bursts is None else [str(bursts)]), *arranged.notes]
+    notes = [*streams, *([] if bursts is None else [str(bursts)]), *arranged.notes]
     # Samples that are all there and in order are not copied.
     rows = arranged.rows if any(arranged.counts.values()) else slice(None)
     ns = stamps[rows]
@@ -270,10 +273,18 @@ def in_order(raw: RawTest) -> Recording:
         f_ib_b=raw.f_ib_b[rows],
         phase=_phase(raw, ns, start_ns, notes),
         temperature=_temperature(raw, ns, start_ns, notes),
-        rejected=len(raw.ns) - len(ns),
+        rejected=came - len(ns),
         notes=tuple(notes),
         clock_steps=as_recorded(steps, raw.ns, start_ns),
     )
+
+
+def _of_one_sensor(raw: RawTest) -> tuple[RawTest, tuple[str, ...]]:
+    """Leave the samples of a second publisher out before their stamps are taken for a fault of a clock."""
+    rows, notes = one_stream(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
+    if rows is None:
+        return raw, notes
+    return replace(raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows]), notes
 
 
 def _without_steps(raw: RawTest, steps: tuple[Step, ...]) -> RawTest:

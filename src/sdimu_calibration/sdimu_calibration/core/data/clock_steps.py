@@ -57,7 +57,7 @@ def find_steps(ns: Ints, omega: Floats, force: Floats) -> tuple[Step, ...]:
     """
     if len(ns) <= max(NOMINAL_FROM, 2 * _FEWEST) or nominal_interval_ns(ns) <= 0:
         return ()
-    interval = _interval(ns)
+    interval = usual_interval(ns)
     places = _uneven(ns, interval)
     if not len(places):
         return ()
@@ -112,8 +112,14 @@ def as_recorded(steps: tuple[Step, ...], mended_ns: Ints, start_ns: int) -> tupl
     return tuple(ClockStep((int(mended_ns[step.row]) - start_ns) * 1e-9, step.ns * 1e-9) for step in steps)
 
 
-def _interval(ns: Ints) -> float:
-    """Interval (ns): the median over many samples at a time, in which jitter hardly counts."""
+def usual_interval(ns: Ints) -> float:
+    """Interval (ns): the median over many samples at a time, in which jitter hardly counts.
+
+    Parameters
+    ----------
+    ns : ndarray of int, shape (n,)
+        Stamps (ns) in the order of arrival; at least two.
+    """
     lag = min(_SIDE, len(ns) // 2)
     first = np.arange(0, len(ns) - lag, max(len(ns) // _ENOUGH, 1))
     return float(np.median(ns[first + lag] - ns[first])) / lag
