@@ -97,6 +97,13 @@ def test_two_equal_publishers_are_refused_by_name(second):
         kept(mixed(jittered(OURS, 0.05) if len(second[0]) == N and np.ptp(np.diff(second[0])) else OURS, second))
 
 
+def test_numbers_that_are_not_finite_do_not_hide_a_publisher():
+    ns, rate, force = mixed(OURS, later(THEIRS, 0.5 * T))
+    force[::50] = np.inf
+    with pytest.raises(DataError, match="two publishers"):
+        kept((ns, rate, force))
+
+
 def test_of_two_equal_publishers_that_which_turns_is_kept():
     ns, rate, force = sensor(2)
     lies = (ns + round(0.3 * T), rate, np.resize(force[:1900], (N, 3)))

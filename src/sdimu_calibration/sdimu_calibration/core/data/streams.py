@@ -169,7 +169,9 @@ def _every_second(samples: Samples, rows: Ints, slot: Callable[[Ints], Ints]) ->
     """Tell two streams that make one even clock of twice the rate; `rows` by their stamps, `slot` of their places."""
     at = in_blocks(rows)
     values, places = samples.values(rows[at]), slot(at)
-    next_one = np.diff(places, axis=1) == 1
+    finite = np.asarray(np.isfinite(values).all(axis=-1))
+    values[~finite] = 0.0
+    next_one = (np.diff(places, axis=1) == 1) & finite[:, 1:] & finite[:, :-1]
     beside = next_one[:, 1:] & next_one[:, :-1]
     sign = np.where(places[:, 1:-1] % 2 == 0, 1.0, -1.0)
     off = off_line(values) * sign[..., None]
