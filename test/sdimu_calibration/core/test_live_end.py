@@ -128,7 +128,18 @@ def stray_status(m):
     return replace(m, status=status, told=("2 messages have stamps outside the test",))
 
 
+def second_publisher(m):
+    """Another IMU on the topic for a part of the test, under the same name, and five strays of it."""
+    n = len(m.ns)
+    rows = np.r_[50 : n // 2, np.linspace(n // 2 + 50, n - 50, 5).astype(int)]
+    at = np.concatenate([m.ns, m.ns[rows] + 3_000_000])
+    w, f = np.concatenate([m.w, m.w[rows] + 1e-3]), np.concatenate([m.f, 1.001 * m.f[rows] + 0.05])
+    order = np.argsort(at, kind="stable")
+    return replace(m, ns=at[order], w=w[order], f=f[order], told=("two publishers with other values",))
+
+
 CASES = (
+    second_publisher,
     stray_status,
     foreign_units,
     negated_force,
@@ -209,6 +220,7 @@ def test_live_end_and_bag_open_the_same_recording(case, tmp_path):
     ("imu", "cases"),
     [
         ("dtg", (foreign_units, jitter, other_clock)),
+        ("fog_tactical", (second_publisher,)),
         ("dtg", (foreign_units, negated_rate, bursts, no_status)),
         ("rlg_navigation", (negated_force, spikes_and_a_stuck_axis)),
         ("fog_tactical", (foreign_units, jitter, no_status, torn)),
@@ -268,3 +280,35 @@ def test_without_a_status_a_wide_specification_does_not_let_turns_pass_on_the_wa
     inside = np.array([log.dwell[(log.t > s - 1.0) & (log.t <= s)].all() for s in t])
     assert not (rests & ~middle & ~inside).any()
     assert rests.sum() > 0.7 * middle.sum()
+
+
+def test_a_bag_with_a_second_publisher_gives_what_the_bag_without_it_gives(tmp_path):
+    m = messages("fog_tactical")
+    imu = load_imu("fog_tactical")
+    alone, mixed = (
+        open_test(recorded(tmp_path / name, case), "daejeon", imu, m.source, handheld=False)
+        for name, case in (("alone", m), ("mixed", second_publisher(m)))
+    )
+    ours, found = (
+        calibrate(test.recording, test.site, test.imu, load_model("baseline"), held_out=False)
+        for test in (alone, mixed)
+    )
+    np.testing.assert_array_equal(found.values, ours.values)
+    np.testing.assert_array_equal(found.covariance, ours.covariance)
+
+
+def test_a_second_publisher_is_told_while_the_test_runs():
+    m = second_publisher(messages("dtg"))
+    found, _ = live(m, "dtg")
+    assert sum("two publishers" in note for note in found.notes) == 1
+
+
+def test_a_test_of_which_no_stream_can_be_told_says_so_early():
+    m = messages("dtg")
+    twice = np.repeat(np.arange(len(m.ns)), 2)
+    odd = np.arange(len(twice)) % 2
+    mixed = replace(m, ns=m.ns[twice] + 3_000_000 * odd, w=m.w[twice], f=m.f[twice] + 0.05 * odd[:, None])
+    found, _ = live(mixed, "dtg")
+    assert sum("will be refused as it is now: /imu/data_raw: two publishers" in note for note in found.notes) == 1
+    with pytest.raises(DataError, match="two publishers write to one topic"):
+        found.opened()

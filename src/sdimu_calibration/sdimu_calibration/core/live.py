@@ -23,6 +23,7 @@ from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
@@ -43,6 +44,8 @@ NS = 1_000_000_000
 """Stamps of a second (ns): header stamps are integers."""
 
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
+_LOOK_S = 60.0
+"""Time (s) after which a second publisher is looked for: a minute of samples shows it, and little of a test is lost."""
 _FAR = 5.0
 """Deviation of chi-square (its standard deviations) that is reported: beyond it a channel contradicts its sigma."""
 
@@ -124,6 +127,7 @@ class LiveCalibration:
         self._dwells: GrowingDwells | None = None
         self._second = 0  # whole seconds after the origin that are done
         self._idle = False
+        self._early: KeptTest | None = KeptTest()
         self._acceleration = 0.0
         self._lost = self._contradicted = 0
         self._reducer: Reducer | None = None
@@ -160,6 +164,8 @@ class LiveCalibration:
         """
         if self._kept is not None:
             self._kept.samples(ns, omega_ib_b, f_ib_b)
+        if self._early is not None:
+            self._early.samples(ns, omega_ib_b, f_ib_b)
         if not self._idle:
             self._intake.add_samples(ns, omega_ib_b, f_ib_b)
 
@@ -214,6 +220,8 @@ class LiveCalibration:
     def _advance(self, until_ns: int, until_s: float, status_known: bool, final: bool) -> list[EpochEstimate]:
         origin_ns = self._intake.origin_ns
         assert origin_ns is not None
+        if until_s >= _LOOK_S:
+            self._look_for_publishers()
         if self._idle:
             return []
         ns, omega, force = self._intake.due(until_ns)
@@ -239,8 +247,19 @@ class LiveCalibration:
             self._stop()
             return []
 
+    def _look_for_publishers(self) -> None:
+        """Say once, while it can still be mended, what the end would say of a second publisher."""
+        if self._early is None:
+            return
+        raw, self._early = self._early.raw(), None
+        try:
+            self.notes += one_stream(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)[1]
+        except DataError as error:
+            self.notes.append(f"the end of the test will be refused as it is now: {error}")
+
     def _stop(self) -> None:
         """Leave the rest to the end."""
+        self._look_for_publishers()
         self._idle, self._pending, self._waiting = True, [], []
         self._intake.clear()
 
