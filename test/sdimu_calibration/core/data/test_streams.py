@@ -146,6 +146,23 @@ def test_strays_of_another_sensor_are_dropped_and_counted(rows, jitter):
     assert ("1 sample is" if len(rows) == 1 else f"{len(rows)} samples are") + " of another sensor" in note
 
 
+def test_a_second_sensor_that_turns_at_other_times_is_told():
+    ns, rate, force = THEIRS
+    theirs = part((ns + round(0.3 * T), rate, np.roll(force, 900, axis=0)), slice(0, 8000))
+    found, (note,) = kept(mixed(OURS, theirs))
+    np.testing.assert_array_equal(found[2], OURS[2])
+    assert "two publishers with other values" in note
+
+
+def test_strays_that_fit_by_chance_go_with_those_that_do_not():
+    rows = np.arange(500, N, 900)
+    ns, rate, force = part(later(OURS, 0.3 * T), rows)
+    force[0] += 1.0
+    found, (note,) = kept(mixed(OURS, (ns, rate + 1e-6, force)))
+    np.testing.assert_array_equal(found[2], OURS[2])
+    assert f"{len(rows)} samples are of another sensor" in note
+
+
 def bursts(packet, apart_ns):
     ns, *values = OURS
     first = np.minimum(np.arange(N) // packet * packet + packet - 1, N - 1)

@@ -49,10 +49,11 @@ def foreign_samples(samples: Samples, clock: Ints, left: Ints, after: Ints) -> S
     foreign = (off > np.maximum(_APART * noise, np.maximum(_ROUGH * rough, _MOVED * change))).any(axis=1)
     if not foreign.any():
         return None
-    number = counted(int(np.count_nonzero(foreign)), "sample is", "samples are")
-    first = (samples.ns[left[foreign][0]] - samples.ns[clock[0]]) * 1e-9
+    # Of the same sensor are those, too, whose values happen to fit: they are one more all the same.
+    number = counted(len(left), "sample is", "samples are")
+    first = (samples.ns[left[0]] - samples.ns[clock[0]]) * 1e-9
     note = (
-        f"{samples.topic}: {number} of another sensor and left out (the first {first:.1f} s after the start): one "
-        "more than the even clock of the others has, with other values; look for a second publisher"
+        f"{samples.topic}: {number} of another sensor and left out (the first {first:.1f} s after the start): more "
+        "than the even clock of the others has, with other values; look for a second publisher"
     )
-    return Split(left[foreign], note)
+    return Split(left, note)

@@ -29,6 +29,8 @@ _EXPLAINED = 0.5
 sensors, which have other biases and scale factors: hum at half the sample rate alternates, too, but comes and goes."""
 _MOTION = 5.0
 """Ratio of a difference to that of the motion of one sensor (1), at least: a line between samples cuts its curves."""
+_QUIET = 3.0
+"""Ratio of the scatter in a block to the usual one (1) up to which no turn begins in it: noise is alike."""
 _ROUNDING = 1e-9
 """Ratio of a difference to the largest value at least: below it is the rounding of numbers."""
 
@@ -168,9 +170,13 @@ def of_two_sensors(blocks: list[Floats], values: Floats, motion: Floats) -> bool
     sure &= usual > np.maximum(_ROUNDING * np.abs(values).max(axis=(0, 1)), _MOTION * motion)
     if not sure.any():
         return False
-    shown = np.column_stack([np.ones(len(blocks)), np.median(values, axis=1)])
+    # Where one sensor turns and the other does not yet, their difference is that of motions.
+    spread = np.array(scatter)
+    quiet = (spread <= _QUIET * np.median(spread, axis=0)).all(axis=1)
+    if 2 * np.count_nonzero(quiet) >= len(blocks):
+        middle, values = middle[quiet], values[quiet]
+    shown = np.column_stack([np.ones(len(middle)), np.median(values, axis=1)])
     left = middle - shown @ np.linalg.lstsq(shown, middle, rcond=None)[0]
-    free = len(blocks) - shown.shape[1]
-    unexplained = np.sqrt((left**2).sum(axis=0) / free)
+    unexplained = np.sqrt((left**2).sum(axis=0) / max(len(middle) - shown.shape[1], 1))
     explained = unexplained < _EXPLAINED * np.sqrt((middle**2).mean(axis=0))
     return bool(np.any(sure & explained))
