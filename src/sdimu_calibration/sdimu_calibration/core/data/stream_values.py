@@ -30,7 +30,9 @@ sensors, which have other biases and scale factors: hum at half the sample rate 
 _MOTION = 5.0
 """Ratio of a difference to that of the motion of one sensor (1), at least: a line between samples cuts its curves."""
 _QUIET = 3.0
-"""Ratio of the scatter in a block to the usual one (1) up to which no turn begins in it: noise is alike."""
+"""Ratio of the scatter in a block to that of a quiet one (1) up to which no turn begins in it: noise is alike."""
+_RESTS = 0.25
+"""Share of the blocks (1) that are quiet at least: a hand that turns two IMUs leaves as many."""
 _ROUNDING = 1e-9
 """Ratio of a difference to the largest value at least: below it is the rounding of numbers."""
 
@@ -172,8 +174,8 @@ def of_two_sensors(blocks: list[Floats], values: Floats, motion: Floats) -> bool
         return False
     # Where one sensor turns and the other does not yet, their difference is that of motions.
     spread = np.array(scatter)
-    quiet = (spread <= _QUIET * np.median(spread, axis=0)).all(axis=1)
-    if 2 * np.count_nonzero(quiet) >= len(blocks):
+    quiet = (spread <= _QUIET * np.quantile(spread, _RESTS, axis=0)).all(axis=1)
+    if np.count_nonzero(quiet) >= _FEWEST_BLOCKS:
         middle, values = middle[quiet], values[quiet]
     shown = np.column_stack([np.ones(len(middle)), np.median(values, axis=1)])
     left = middle - shown @ np.linalg.lstsq(shown, middle, rcond=None)[0]
