@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
-from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.results import Calibration
@@ -28,6 +28,9 @@ from sdimu_calibration.report.effect_words import tip
 from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.markup import grid, prose, quiet
 from sdimu_calibration.report.report_extras import ReportExtras
+
+if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 _MARKS = {GOOD: "\N{CHECK MARK}", DOUBTFUL: "!", BAD: "\N{HEAVY BALLOT X}"}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from sdimu_calibration.core.diagnosis.grades import size_of
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
-from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.results import Calibration, Rest
 from sdimu_calibration.core.units import from_si
@@ -34,6 +33,9 @@ from sdimu_calibration.report.unknown_section import unknown_of, unknown_section
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
+
+if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.evidence_figures import deviates
 from sdimu_calibration.report.groups import is_free
 from sdimu_calibration.report.markup import Draw, grid, quiet, section
 from sdimu_calibration.report.table import with_sigma
+
+if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+    from sdimu_calibration.core.joint.recurrence import Recurrence
 
 _TRENDS = 8
 """Number of trends that are listed: the others are further inside chance."""

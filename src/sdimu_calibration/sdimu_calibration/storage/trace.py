@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
-from sdimu_calibration.storage.files.datasheet_file import file_hashes
+from sdimu_calibration.storage.files.file_hashes import file_hashes
 
 
 @dataclass(frozen=True)

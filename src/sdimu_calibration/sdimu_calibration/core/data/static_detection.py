@@ -17,6 +17,7 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -235,18 +236,35 @@ def still_samples(recording: Recording, width: int, turning: float, hole: float,
 
 def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
     """Mean (n, 3) and summed variance (n,) over the window about each sample; infinite scatter near the ends."""
-    mean = np.zeros_like(values)
+    mean = np.zeros(values.shape)
     scatter = np.full(len(values), np.inf)
-    at = slice(width // 2, width // 2 + len(values) - width + 1)
-    scatter[at] = 0.0
-    # One axis after the other: a recording of noise may last for days.
-    for axis, x in enumerate(values.T):
-        middle = np.median(x)
-        total, squares = (np.concatenate([[0.0], np.cumsum((x - middle) ** power)]) for power in (1, 2))
-        within = (total[width:] - total[:-width]) / width
-        mean[at, axis] = within + middle
-        scatter[at] += (squares[width:] - squares[:-width]) / width - within**2
+    _slide(np.ascontiguousarray(values), values.mean(axis=0), width, mean, scatter)
     return mean, scatter
+
+
+@compiled
+def _slide(values: Floats, middle: Floats, width: int, mean: Floats, scatter: Floats) -> None:
+    """Put mean (n, 3) and summed variance (n,) of `width` samples at the middle one of each window, in place.
+
+    Sums are of ``values - middle``: squares of gravity would leave no digits for its scatter.
+    """
+    total, squares = np.zeros(3), np.zeros(3)
+    for i in range(len(values)):
+        at = i - width + 1 + width // 2
+        if i >= width - 1:
+            scatter[at] = 0.0
+        for k in range(3):
+            new = values[i, k] - middle[k]
+            total[k] += new
+            squares[k] += new * new
+            if i >= width:
+                old = values[i - width, k] - middle[k]
+                total[k] -= old
+                squares[k] -= old * old
+            if i >= width - 1:
+                within = total[k] / width
+                mean[at, k] = within + middle[k]
+                scatter[at] += squares[k] / width - within * within
 
 
 def _like_the_quietest(scatter: Floats, values: Floats, most: float) -> Bools:

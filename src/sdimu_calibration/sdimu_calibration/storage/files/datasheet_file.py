@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Annotated, Final, Literal
 
 from sdimu_calibration.core.fleet import sheet
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.file_hashes import file_hashes
 from sdimu_calibration.storage.files.fleet_folder import Entry
 from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_model import Entry as DataclassEntry
@@ -119,17 +119,3 @@ def recordings_of(entry: Entry) -> list[str]:
     if of_set is not None:
         return [one.name for one in of_set.recordings]
     return [entry.result.origin.recording] if entry.result.origin.recording else []
-
-
-def file_hashes(path: Path) -> dict[Path, tuple[str, str]]:
-    """Name and SHA-256 of a file, or of the files of a bag, by path."""
-    files = [path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file())
-    return {
-        file.resolve(): (file.name if path.is_file() else f"{path.resolve().name}/{file.name}", _sha256(file))
-        for file in files
-    }
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
