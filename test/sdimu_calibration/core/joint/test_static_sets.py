@@ -10,6 +10,7 @@ import pytest
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_study.static_world import CUBE, GRADES, PAIR, beyond_prior, rests, truth, wander
 
@@ -95,3 +96,15 @@ def test_static_recordings_are_diagnosed(grade):
     found = diagnose_set(rests(grade, 1, PAIR), OPTIONS, here)
     assert np.isfinite(found.after.values).all()
     held_to_truth(found.after, grade, 1, PAIR)
+
+
+@pytest.mark.parametrize(
+    ("grade", "seed", "turns", "noise"),
+    [("mems_industrial", 210005, CUBE, ("accel_noise_flicker=70 ug",)), ("mems_consumer", 210010, PAIR, None)],
+)
+def test_noise_that_moves_within_the_only_rest_of_a_recording_is_no_warm_up(grade, seed, turns, noise):
+    """A walk over 20 s looks like the ramp of a warm-up: the recording must know of noise that does so."""
+    found = diagnose_set(rests(grade, seed, turns, noise), OPTIONS, here)
+    assert found.verdict == Verdict.CONSISTENT
+    assert found.probabilities is not None
+    assert found.probabilities.nothing > 0.5

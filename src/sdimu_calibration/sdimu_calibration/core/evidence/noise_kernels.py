@@ -23,6 +23,9 @@ from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, FOLLOWS, MARKOV
 _LONGEST_S = 30.0
 """Longest stretch (s): flicker of data-sheet size moves within it by less than a tenth of the variance of white noise
 in dtg, fog_tactical and rlg_navigation; for others `stretch_length` halves it."""
+_FEWEST = 8
+"""Number of stretches (1) at least: the mean of one is the bias, and noise that moves within a rest of 20 s, the whole
+recording, was taken for a warm-up."""
 _MOST = 100
 """Number of stretches at most: longer tests have longer ones, and the time of an estimate goes with the cube."""
 _KEPT = 1e-9
@@ -133,7 +136,7 @@ def stretches(times: Timetable, share: float = 1.0) -> Stretches:
     share : float
         Ratio of their length to the usual one.
     """
-    longest = share * max(_LONGEST_S, times.duration / _MOST)
+    longest = share * min(max(_LONGEST_S, times.duration / _MOST), times.duration / _FEWEST)
     spans = sorted([(a, b, False) for _, a, b in times.stops] + [(a, b, True) for _, a, b in times.turns])
     rows: list[tuple[float, float, int, bool]] = []
     for number, (begin, end, turning) in enumerate(spans):
