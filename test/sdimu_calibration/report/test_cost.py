@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from sdimu_calibration.report.cost import InUse
+from sdimu_calibration.report.cost import InUse, Off
+
+
+def test_what_is_wrong_without_an_effect_is_told_as_well_as_it_is_known():
+    assert Off("accel_bias_z", 127.3, "ug", 35.2, 55.7).text == "accel_bias_z +127 +- 35 ug (55.7 of its sigmas)"
+    assert Off("gyro_scale_y", -26.84, "ppm", 4.85, -5.5).size == "-26.8 +- 4.8 ppm"
+
 
 NAMES = ("not compensated", "model as given", "with what was found")
 

@@ -21,6 +21,12 @@ from sdimu_calibration.core.note import MISFITS, topic_of
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.files.whole_file import written_together
 
+_NOT_LOOKED_FOR = (
+    "Nobody has looked for small effects that the model lacks; one that the fit takes up moves a coefficient by many "
+    "of its sigmas. To look:"
+)
+"""What a calibration cannot know without a misfit."""
+
 
 @dataclass(frozen=True)
 class CalibrationRequest(FitRequest):
@@ -84,10 +90,10 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     console.print(rich_table(rows(result, true), f"body frame: {result.body_frame}"), soft_wrap=True)
     at = relative_line(result.references)
     tell(console, (*((at,) if at else ()), *notes, *(note for note in result.notes if note not in notes)))
-    if any(topic_of(note) in MISFITS for note in result.notes):
-        say(console, "To learn what the model misses:")
-        able = request if fit.diagnosable else replace(request, estimator=AUTO)
-        command(console, Asked.of((bag,), folder, opening, able).command("diagnose"))
+    misfit = any(topic_of(note) in MISFITS for note in result.notes)
+    say(console, "To learn what the model misses:" if misfit else _NOT_LOOKED_FOR)
+    able = request if fit.diagnosable else replace(request, estimator=AUTO)
+    command(console, Asked.of((bag,), folder, opening, able).command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", request.as_json)
     leave(result)

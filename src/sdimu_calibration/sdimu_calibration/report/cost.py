@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.grades import decimals
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.free_inertial import NOTHING
@@ -15,8 +16,6 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.report_extras import ReportExtras
 
 _KILOMETRE = 1000.0
-_WHOLE = 100.0
-"""Amount from which there are no decimals: three digits of it would be written with an exponent."""
 _CHANCE = 3.0
 """Error of position over its predicted sigma (1) from which it is no chance, of one stretch or two."""
 _WHOLE_M = 10.0
@@ -31,25 +30,27 @@ class Off:
     ----------
     amount : float
         By how much it is too large, in `unit`.
+    sigma : float
+        Sigma of the better value, in `unit`: how well the amount is known.
     sigmas : float
-        The same over the sigma that it is given with.
+        The amount over the sigma that it is given with.
     """
 
     name: str
     amount: float
     unit: str
+    sigma: float
     sigmas: float
 
     @property
     def text(self) -> str:
-        """In words: ``gyro_scale_y +26.2 ppm (5.5 of its sigmas)``."""
+        """In words: ``gyro_scale_y +26.2 +- 4.8 ppm (5.5 of its sigmas)``."""
         return f"{self.name} {self.size} ({abs(self.sigmas):.1f} of its sigmas)"
 
     @property
     def size(self) -> str:
-        """The amount with its unit: ``+26.2 ppm``."""
-        whole = abs(self.amount) >= _WHOLE
-        return f"{self.amount:+.0f} {self.unit}" if whole else f"{self.amount:+.3g} {self.unit}"
+        """The amount with its sigma and unit: ``+26.2 +- 4.8 ppm``."""
+        return f"{self.amount:+.{decimals(self.sigma)}f} +- {self.sigma:.{decimals(self.sigma)}f} {self.unit}"
 
 
 def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]:
@@ -59,7 +60,9 @@ def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]
     out = []
     for name, sigmas in moved_coefficients(before, after):
         size = float(np.sqrt(before.covariance[at[name], at[name]]))
-        out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], -sigmas))
+        k = after.names.index(name)
+        known = from_si(float(np.sqrt(after.covariance[k, k])), units[name])
+        out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], known, -sigmas))
     return tuple(out)
 
 

@@ -174,7 +174,7 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
     elif doubts:
         tone, head = DOUBTFUL, prose(capital(doubts[0])) + "."
     else:
-        tone, head = GOOD, "The model explains the recording as a whole."
+        tone, head = GOOD, "The model explains the recording as a whole; small effects were not looked for."
     kind = Kind.FIND_EFFECT if tone == BAD else Kind.FIND_SMALLER
     bag = (calibration.origin.recording,) if calibration.origin.recording else ()
     advice: list[Advice | str] = ["Check the IMU file, the site, units and axes."] if grave else []

@@ -8,11 +8,15 @@ from dataclasses import replace
 import pytest
 
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import add, others, together
+from sdimu_calibration.core.diagnosis.advice import _at_stake, add, others, telling_turn, together
+from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.diagnosis.grades import other_coefficients
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, TurnSeen
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
 from sdimu_calibration.storage.files.effect_file import find_effects
 
@@ -85,8 +89,41 @@ def test_what_is_likely_is_tried_and_not_kept():
     assert [one.kind for one in add([sure, open_])] == [Kind.KEEP, Kind.TRY]
     kept, tried = (sentence(one) for one in add([sure, open_]))
     assert kept == "Calibrate with accel_quadratic_x in the model: --add 'accel_quadratic_x'."
-    assert tried.startswith("It is open which effect it is; accel_quadratic_y is the likeliest")
+    assert tried.startswith("It is open which effect it is: record more before you keep accel_quadratic_y. ")
     assert added(add([sure, open_])[1]) == ["accel_quadratic_x", "accel_quadratic_y"]
+
+
+def test_what_is_certain_is_tried_and_not_kept_while_it_is_open_which_of_its_family_it_is():
+    (candidate,) = split(resolve("accel_magnetic_yz"))
+    open_which = (Share("accel_magnetic_yz", 0.86), Share("accel_magnetic_yx", 0.14))
+    one = replace(found(candidate), probability=0.999, of_family=0.999, may_be=open_which)
+    assert [advice.kind for advice in add([one])] == [Kind.TRY]
+    assert [advice.kind for advice in add([replace(one, may_be=open_which[:1])])] == [Kind.KEEP]
+
+
+def test_coefficients_at_stake_are_those_of_members_that_are_named():
+    (candidate,) = split(resolve("gyro_scale_asymmetry_z"))
+    shifts = (
+        CoefficientShift("accel_play_x(r=0.6 g)", "accel_scale_x", -18.0),
+        CoefficientShift("gyro_scale_quadratic_z", "gyro_scale_z", 5.0),
+    )
+    shares = (Share("gyro_scale_asymmetry_z", 0.7), Share("gyro_scale_quadratic_z", 0.29), Share("accel_play_x", 0.005))
+    one = replace(found(candidate), coefficient_shifts=shifts, may_be=shares)
+    assert _at_stake(one).arguments == ("gyro_scale_asymmetry_z", (("gyro_scale_quadratic_z", "gyro_scale_z", 5.0),))
+
+
+@pytest.mark.parametrize(("oblique", "kind"), [(0, Kind.REST_ON_DIAGONAL), (8, Kind.REPEAT_TURN)])
+def test_stops_on_the_diagonal_are_advised_where_the_plan_has_none(oblique, kind):
+    (candidate,) = split(resolve("accel_quadratic_z"))
+    turns = tuple(TurnSeen(k, k % 3, (-1.0) ** (k // 3), 0.1 * (1 + k // 3), 0.3) for k in range(6))
+    assert telling_turn(candidate.effect, PlanSeen(turns, oblique, 2.0)).kind == kind
+
+
+def test_an_equation_has_no_variant_that_its_brackets_would_hide():
+    assert other_coefficients("accel_x: sin(2 fx)", ["accel_x: sin(3 fx)"]) == ("accel_x: sin(3 fx)",)
+    assert other_coefficients("gyro_bias_step_x(t0=60 s)", ["gyro_bias_step_x(t0=90 s)@r1"]) == (
+        "gyro_bias_step_x(t0=90 s)@r1",
+    )
 
 
 def test_another_time_constant_of_the_same_effect_is_not_to_be_told_apart():

@@ -48,6 +48,16 @@ def test_a_class_that_is_certain_says_which_member_is_open_each_with_its_probabi
     assert told.endswith(f") 82 % or {named('accel_cubic_x')} 18 %.")
 
 
+def test_shares_beyond_all_are_said_to_be_of_two_that_may_be_there(summary):
+    told = said(with_shares(summary, 0.92, (own(summary), 0.6), ("accel_cubic_x", 0.43)))
+    assert told.endswith("43 %; two of them may be there.")
+
+
+def test_an_equation_that_fits_is_not_called_certain_physics(summary):
+    (one,) = graded(with_shares(summary, 0.999, (own(summary), 0.999)).candidates, None)
+    assert in_grades([one], "Missing for certain, and fitted by").startswith("Missing for certain, and fitted by: acc")
+
+
 def test_what_is_likely_says_how_likely(summary):
     told = said(with_shares(summary, 0.9, (own(summary), 0.9)))
     assert told.startswith("Likely (90 %): ")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from sdimu_calibration.core.estimation.solve import extend, solve
-from sdimu_calibration.core.filter.impossible_prior import impossible_prior
+from sdimu_calibration.core.filter.impossible_prior import impossible_prior, possible
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_model
@@ -61,6 +61,12 @@ def test_of_an_imu_file_its_own_key_is_named(bench):
 def test_usual_priors_are_blamed_for_nothing(bench):
     fit = bench.fit()
     assert impossible_prior(fit.setup.sensors, fit.solution.last.data.values, "mine.yaml") == ""
+
+
+def test_a_motion_that_an_earlier_pass_made_of_it_blames_no_prior(bench):
+    motion = bench.fit().bare.seen
+    assert possible(motion)
+    assert not possible(replace(motion, f=motion.f * 1e9))
 
 
 def test_a_wide_prior_that_the_filter_bears_is_not_refused(bench):

@@ -13,10 +13,12 @@ from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
+from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coefficients
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.noise_term import FOLLOWS
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 
@@ -95,7 +97,7 @@ def _about_data(d: Diagnosis) -> list[Advice]:
 def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list[Advice]:
     if d.verdict == Verdict.UNEXPLAINED:
         return _about_unknown(d, found)
-    out = add([one for one in found if _belongs(one)])
+    out = add([one for one in found if _belongs(one)], d.probabilities)
     for one in found:
         if one.candidate.family == references.LATITUDE.name:
             out.append(Advice(Kind.CORRECT_LATITUDE, (one.value, one.sigma)))
@@ -106,7 +108,7 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
         rivals = others(one)
         if rivals and all(map(_in_catalogue, names := (one.candidate.label, rivals[0]))):
             out.append(Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names))
-        if one.coefficient_shifts:
+        if _in_sight(one):
             out.append(_at_stake(one))
     return out
 
@@ -119,9 +121,12 @@ def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
     return out + ([Advice(Kind.TRY_EQUATION, near)] if near else [])
 
 
-def add(found: Sequence[Found]) -> list[Advice]:
+def add(found: Sequence[Found], told: Probabilities | None = None) -> list[Advice]:
     """Advise how what was found gets into the model: what is decided to stay, what is open to be tried."""
-    decided, doubtful = [one for one in found if one.decided], [one for one in found if not one.decided]
+    settled = [one.decided and not grade.is_open for one, grade in zip(found, graded(found, told), strict=True)]
+    decided, doubtful = (
+        [one for one, is_sure in zip(found, settled, strict=True) if is_sure == sure] for sure in (True, False)
+    )
     out = [_adding(Kind.KEEP, decided, decided)] if decided else []
     return [*out, _adding(Kind.TRY, doubtful, found)] if doubtful else out
 
@@ -133,8 +138,7 @@ def _adding(kind: Kind, named: Sequence[Found], added: Sequence[Found]) -> Advic
 
 def others(one: Found) -> tuple[str, ...]:
     """Labels of what looks the same as an effect and is another coefficient: no other time constant of its own."""
-    own = one.candidate.label.partition("(")[0]
-    return tuple(label for label in one.alike if label.partition("(")[0] != own)
+    return other_coefficients(one.candidate.label, one.alike)
 
 
 def together(asked: Sequence[tuple[Found, Advice]]) -> list[Advice]:
@@ -157,12 +161,18 @@ def _belongs(one: Found) -> bool:
 
 
 def _at_stake(one: Found) -> Advice:
-    """Say which coefficients are right only if the named member of a class is the right one."""
+    """Say which coefficients are right only if the named member of a class is the right one, by members in sight."""
     largest: dict[str, CoefficientShift] = {}
-    for stake in sorted(one.coefficient_shifts, key=lambda s: -abs(s.sigmas)):
+    for stake in sorted(_in_sight(one), key=lambda s: -abs(s.sigmas)):
         largest.setdefault(stake.coefficient, stake)
     stakes = tuple((s.other, s.coefficient, s.sigmas) for s in list(largest.values())[:_MOST_STAKES])
     return Advice(Kind.CHOICE_MATTERS, (one.candidate.label, stakes))
+
+
+def _in_sight(one: Found) -> list[CoefficientShift]:
+    """Coefficients that move with members of the class that are named beside it: others are too improbable."""
+    named = {share.name for share in one.may_be if share.probability >= NAMED}
+    return [s for s in one.coefficient_shifts if not one.may_be or s.other.partition("(")[0] in named]
 
 
 def telling_turn(effect: Effect, plan: PlanSeen) -> Advice:
@@ -175,7 +185,7 @@ def telling_turn(effect: Effect, plan: PlanSeen) -> Advice:
         return Advice(Kind.TURN_BACK, (dwell + 1.5,))
     if Excitation.REPEATED_ATTITUDES in needed:
         return Advice(Kind.STAY_AND_RETURN, (_SLOW_MINUTES, dwell + 1.0))
-    if Excitation.OBLIQUE_STOPS in needed:
+    if Excitation.OBLIQUE_STOPS in needed and not plan.oblique:
         return Advice(Kind.REST_ON_DIAGONAL, (2 * (dwell + 0.6),))
     return Advice(Kind.REPEAT_TURN, (2 * (dwell + 0.5),))
 
@@ -213,7 +223,11 @@ def _rates(plan: PlanSeen) -> str:
 
 def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...]:
     """Advise, the most useful first."""
-    out = [*mend(d), *add(found), *together([(one, _more_handheld(one)) for one in found if others(one)])]
+    out = [
+        *mend(d),
+        *add(found, d.probabilities),
+        *together([(one, _more_handheld(one)) for one in found if others(one)]),
+    ]
     out += [
         Advice(Kind.CHOICE_MATTERS_HANDHELD, (one.candidate.label, s.other, s.coefficient, s.sigmas))
         for one in found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -19,8 +20,15 @@ CERTAIN = 0.99
 """Probability (1) from which an effect is called certain: one in a hundred is wrong then."""
 NAMED = 0.05
 """Probability (1) from which something that may be there instead is named: one in twenty."""
+_VARIANT = re.compile(r"\([^)]*\)")
+"""Variant of an effect in its label (text): time constants and other numbers in brackets."""
 LISTED = 4
 """Number of effects, or of those that may be one, that a sentence lists: more do not fit into one."""
+
+
+_MORE_THAN_ONE = 1.005
+"""Sum of probabilities (1) that shows as more than 100 %: models that hold two of the effects count for both."""
+_TWO = "two of them may be there"
 
 
 @dataclass(frozen=True)
@@ -67,13 +75,19 @@ def graded(found: Iterable[Found], told: Probabilities | None) -> tuple[Graded, 
     )
 
 
-def in_grades(found: Sequence[Graded]) -> str:
-    """Say what was found by how sure it is; without grades where no probabilities were worked out."""
+def in_grades(found: Sequence[Graded], certain: str = "Certain") -> str:
+    """Say what was found by how sure it is; without grades where no probabilities were worked out.
+
+    Parameters
+    ----------
+    certain : str
+        Word before what is certain.
+    """
     if any(np.isnan(one.probability) for one in found):
         return f"Missing in the model: {listed(one.words for one in found)}."
     firm = [one.words for one in found if one.certain and not one.is_open]
-    told = [f"Certain: {listed(firm)}."] if firm else []
-    told += [f"Certain, but open which: {_open(one)}." for one in found if one.certain and one.is_open]
+    told = [f"{certain}: {listed(firm)}."] if firm else []
+    told += [f"{certain}, but open which: {_open(one)}." for one in found if one.certain and one.is_open]
     told += [f"Likely ({in_percent(one.probability)}): {_likely(one)}." for one in found if not one.certain]
     more = len(told) - LISTED
     return " ".join(told[:LISTED]) + (f" {more} more are in the table." if more > 0 else "")
@@ -108,8 +122,10 @@ def _likely(one: Graded) -> str:
 def _open(one: Graded) -> str:
     """Name what it may be, each with its probability; the likeliest with its size."""
     sizes = {one.coefficient: f" ({one.size})"}
-    told = [f"{named(s.name)}{sizes.get(s.name, '')} {in_percent(s.probability)}" for s in one.may_be[:LISTED]]
-    return " or ".join([", ".join(told[:-1]), told[-1]]) if len(told) > 1 else told[0]
+    shown = one.may_be[:LISTED]
+    told = [f"{named(s.name)}{sizes.get(s.name, '')} {in_percent(s.probability)}" for s in shown]
+    both = f"; {_TWO}" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
+    return f"{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
 
 
 def _sized(one: Found) -> str:
@@ -124,9 +140,12 @@ def size_of(one: Found) -> str:
 def size(value: float, sigma: float, unit: str) -> str:
     """Write an SI value with its sigma in `unit`."""
     value, sigma = from_si(value, unit), from_si(sigma, unit)
-    # Two digits of sigma, and no more of the value.
-    decimals = max(0, 1 - int(np.floor(np.log10(sigma)))) if np.isfinite(sigma) and sigma > 0.0 else 0
-    return f"{value:.{decimals}f} +- {sigma:.{decimals}f} {unit}"
+    return f"{value:.{decimals(sigma)}f} +- {sigma:.{decimals(sigma)}f} {unit}"
+
+
+def decimals(sigma: float) -> int:
+    """Count the decimals that show two digits of a sigma, and no more of its value."""
+    return max(0, 1 - int(np.floor(np.log10(sigma)))) if np.isfinite(sigma) and sigma > 0.0 else 0
 
 
 def name_of(one: Found) -> str:
@@ -147,6 +166,17 @@ def named(coefficient: str) -> str:
     axis = coefficient.partition("(")[0].removeprefix(effect.family or effect.name).strip("_")
     # A name without its time constant holds for every one.
     return _with_axis(effect.title, axis, effect.variant if "(" in coefficient else "")
+
+
+def other_coefficients(label: str, alike: Iterable[str]) -> tuple[str, ...]:
+    """Labels of another coefficient, or of the same one in another recording: no other time constant of its own."""
+    own = _without_variant(label)
+    return tuple(other for other in alike if _without_variant(other) != own)
+
+
+def _without_variant(label: str) -> str:
+    """Return a label without the numbers of its variant; an equation, which has brackets of its own, as it is."""
+    return label if ":" in label else _VARIANT.sub("", label)
 
 
 def _with_axis(title: str, axis: str, variant: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import LISTED, graded, in_grades, listed
+from sdimu_calibration.core.diagnosis.grades import LISTED, graded, in_grades, listed, other_coefficients
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
@@ -33,6 +33,10 @@ _COLOURED = 1.2
 minutes."""
 _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
+
+
+_EQUATION = "Missing for certain, and fitted by"
+"""What is said of equations in the place of ``Certain``."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,8 @@ def verdict(facts: Facts) -> Verdict:
             return Verdict.SEVERAL_EFFECTS
         if chosen[0].effect.scope == "recording":
             return Verdict.DATA_FAULT
-        return Verdict.CLASS_OF_EFFECTS if facts.alike else Verdict.ONE_EFFECT
+        open_which = other_coefficients(chosen[0].label, facts.alike)
+        return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
     if facts.noise:
         return Verdict.NOISE_MODEL_WRONG
     return Verdict.CONSISTENT
@@ -93,8 +98,11 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
         return f"The data have a fault: {'; '.join(faults)}."
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
-    told = in_grades(graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities))
-    return f"No effect of the catalogue fits, an equation does. {told}" if d.own else told
+    every = graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities)
+    if not d.own:
+        return in_grades(every)
+    # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
+    return f"No effect of the catalogue fits, an equation does. {in_grades(every, _EQUATION)}"
 
 
 def _consistent(d: Diagnosis) -> str:

@@ -6,12 +6,21 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.units import from_si
 
 _NO_ERROR = np.array([10.0] * 3 + [1000.0] * 3)
 """Error of a sensor (rad/s for gyros, m/s^2 for accelerometers) that none has: 570 deg/s or 100 g beside the truth."""
+_NO_MOTION = np.array([100.0] * 3 + [1000.0] * 3)
+"""Rate (rad/s) and specific force (m/s^2) that no test has: 16 turns a second, 100 g."""
 _ONE = 0.9995
 """Cosine (1) of two signatures from which they are one: each then has thirty times the sigma it would have alone."""
+
+
+def possible(motion: Motion) -> bool:
+    """Whether forces and rates of a motion are such as a sensor feels."""
+    felt = np.hstack([motion.w, motion.f])
+    return bool(np.all(np.abs(felt) < _NO_MOTION))
 
 
 def impossible_prior(sensors: ImuModel, values: Floats, place: str) -> str:

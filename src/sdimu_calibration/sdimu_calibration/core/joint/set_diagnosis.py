@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, size
+from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, other_coefficients, size
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
@@ -283,7 +283,8 @@ def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, ag
     if len(shared) > 1:
         return Verdict.SEVERAL_EFFECTS
     if shared:
-        return Verdict.CLASS_OF_EFFECTS if shared[0].alike else Verdict.ONE_EFFECT
+        open_which = other_coefficients(shared[0].label, shared[0].alike)
+        return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
     return Verdict.DATA_FAULT if findings else Verdict.CONSISTENT
 
 

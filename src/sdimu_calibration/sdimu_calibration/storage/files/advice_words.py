@@ -102,7 +102,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     ),
     Kind.KEEP: lambda label: f"Calibrate with {label or 'what was found'} in the model",
     Kind.TRY: lambda label: (
-        f"It is open which effect it is; {label} is the likeliest. Record more before you keep it. What it changes"
+        f"It is open which effect it is: record more before you keep {label}. What it changes"
         if label
         else "Of some it is open which effect it is. Record more before you keep them. What they change"
     ),
