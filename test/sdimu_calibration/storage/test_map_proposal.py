@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -11,14 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY
-from sdimu_calibration.storage.files.config import load_imu, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_calibration.storage.importing.import_map import ImportMap, load_import_map
 from sdimu_calibration.storage.importing.importer import read_files
 from sdimu_calibration.storage.importing.map_proposal import propose_maps
 from sdimu_calibration.storage.importing.text_table import column_text
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
+from sdimu_sim.core.scenario import Scenario, generate
 
 
 @pytest.fixture(scope="module")
@@ -267,6 +271,48 @@ def test_units_in_headings_that_the_numbers_contradict_are_told(tmp_path, hand):
     for word in ("the headings say g,", "the headings say deg/s,", "its heading says ms,"):
         assert any(word in line and "check it" in line for line in proposal.words)
     same(read_by(proposal, path), hand)
+
+
+@pytest.fixture(scope="module")
+def table():
+    """The first nine turns of kim18, quicker, at 20 Hz."""
+    turns = tuple(replace(turn, rate_rad_s=np.radians(9.0)) for turn in load_plan("kim18").turns[:9])
+    plan = Plan("nine turns", (12.0,) * 10, turns, np.radians(9.0))
+    return generate(Scenario(plan, load_imu("dtg"), load_site("daejeon"), rate_hz=20.0, seed=5))[0]
+
+
+@pytest.mark.parametrize("signs", list(product((1, -1), repeat=3)))
+@pytest.mark.parametrize("source", ["hand", "table"])
+def test_gyros_of_the_wrong_sense_are_told_and_turned_round_in_the_map(tmp_path, request, source, signs):
+    recording = request.getfixturevalue(source)
+    reversed_gyros = recording.omega_ib_b * signs
+    path = write(
+        tmp_path / "a.csv", "t,ax,ay,az,gx,gy,gz", np.column_stack([recording.t, recording.f_ib_b, reversed_gyros])
+    )
+    (proposal,) = propose_maps([path])
+    same(read_by(proposal, path), recording)
+    told = [word for word in proposal.words if "turns close with the opposite sign of" in word]
+    assert len(told) == (signs != (1, 1, 1))
+
+
+def test_the_sign_is_told_beside_any_unit_and_without_headings(tmp_path, hand):
+    heading = "t,ax,ay,az,gx [deg/h],gy [deg/h],gz [deg/h]"
+    in_degrees_an_hour = -hand.omega_ib_b / (np.pi / 180 / 3600)
+    path = write(tmp_path / "a.csv", heading, np.column_stack([hand.t, hand.f_ib_b, in_degrees_an_hour]))
+    (stated,) = propose_maps([path])
+    assert "sign: [-1, -1, -1]" in stated.text
+    path = write(tmp_path / "b.csv", "", np.column_stack([hand.t, hand.f_ib_b, -hand.omega_ib_b / (np.pi / 180 / 131)]))
+    (unsaid,) = propose_maps([path])
+    same(read_by(unsaid, path), hand)
+
+
+def test_an_axis_that_is_not_turned_about_goes_with_the_others(tmp_path):
+    turns = tuple(Turn(axis, np.radians(90.0), np.radians(9.0)) for axis in "YYYY")
+    plan = Plan("about one axis", (12.0,) * 5, turns, np.radians(9.0))
+    one = generate(Scenario(plan, load_imu("dtg"), load_site("daejeon"), rate_hz=20.0, seed=5))[0]
+    columns = np.column_stack([one.t, one.f_ib_b, -one.omega_ib_b])
+    (proposal,) = propose_maps([write(tmp_path / "a.csv", "t,ax,ay,az,gx,gy,gz", columns)])
+    assert "sign: [-1, -1, -1]" in proposal.text
 
 
 def test_columns_that_never_change_or_hold_few_numbers_are_told(tmp_path, hand):

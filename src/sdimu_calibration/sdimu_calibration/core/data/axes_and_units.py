@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -319,7 +320,34 @@ def _reading_notes(reading: float, stated: Stated) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def fitting_scale(t: Floats, w: Floats, f: Floats, factors: Sequence[float]) -> tuple[float | None, float]:
+class TurnsFit(NamedTuple):
+    """With what the rates turn the force as it turns.
+
+    Attributes
+    ----------
+    factor : float or None
+        rad/s of one number, positive; None where no turn tells it.
+    left : float
+        Share of the change of gravity's direction that is left.
+    signs : tuple of int
+        1 or -1 of each gyro.
+    as_recorded : float
+        What is left with the signs as recorded, at best.
+    """
+
+    factor: float | None
+    left: float
+    signs: tuple[int, int, int]
+    as_recorded: float
+
+
+AS_RECORDED = (1, 1, 1)
+"""Signs of gyros of which none is reversed."""
+NO_TURN = TurnsFit(None, 1.0, AS_RECORDED, 1.0)
+"""What is said where no turn changes the direction of gravity."""
+
+
+def fitting_scale(t: Floats, w: Floats, f: Floats, factors: Sequence[float], any_sense: bool = False) -> TurnsFit:
     """Find the factor on the rates with which the turns agree best with the change of gravity's direction.
 
     Parameters
@@ -330,22 +358,54 @@ def fitting_scale(t: Floats, w: Floats, f: Floats, factors: Sequence[float]) -> 
         Body rate in any unit, specific force in any unit.
     factors : sequence of float
         rad/s of one unit of `w`.
-
-    Returns
-    -------
-    factor : float or None
-        None where no turn tells it.
-    left : float
-        Share of the change of direction that is left.
+    any_sense : bool
+        Where no factor fits, also try gyros of which some are reversed.
     """
     for length_s in _LENGTHS_S:
         windows = cut_windows(t, w, f, length_s)
-        turns = _turning(windows, _FAR)
-        if len(turns):
-            left = {k: Turns(windows, turns, {k: turned(w, windows, turns, k)}, w).misfit(k) for k in factors}
-            best = min(left, key=lambda k: left[k])
-            return (best if left[best] < _FITS else None), left[best]
-    return None, 1.0
+        chosen = _turning(windows, _FAR)
+        if len(chosen):
+            seen = Turns(windows, chosen, {k: turned(w, windows, chosen, k) for k in factors}, w)
+            best = min(factors, key=seen.misfit)
+            left = seen.misfit(best)
+            reversed_ = _reversed(seen, best, factors) if any_sense else None
+            return reversed_ or TurnsFit(best if left < _FITS else None, left, AS_RECORDED, left)
+    return NO_TURN
+
+
+def _reversed(seen: Turns, best: float, factors: Sequence[float]) -> TurnsFit | None:
+    """Find the gyros that are reversed: without them nearly all turns fail, and with them they fit; None for none.
+
+    Parameters
+    ----------
+    best : float
+        The factor that fits best with the signs as recorded.
+    """
+    as_recorded = seen.misfit(best, share=_NEARLY_ALL)
+    if as_recorded < _FITS:
+        return None
+    both = {k: turned(seen.w, seen.windows, seen.chosen, k) for factor in factors for k in (factor, -factor)}
+    turns = replace(seen, C=both)
+    fits = [_of_signs(turns, signs, factors, as_recorded) for signs in _SENSES]
+    least = min(fit.left for fit in fits)
+    if least >= _FITS or as_recorded <= _FAILS * least:
+        return None
+    # Of an axis that is not turned about no turn tells the sign.
+    return next(fit for fit in fits if fit.left <= _FAILS * least)
+
+
+def _of_signs(turns: Turns, signs: tuple[int, int, int], factors: Sequence[float], as_recorded: float) -> TurnsFit:
+    """Fit turns with gyros of other signs; `turns` have the rotations of each factor in both senses."""
+    # An even number of reversed gyros is a half turn of their axes; an odd number is that, and all of them reversed.
+    sense = float(np.prod(signs))
+    axes = np.diag(sense * np.array(signs))
+    misfits = {factor: turns.misfit(sense * factor, axes) for factor in factors}
+    factor = min(misfits, key=lambda k: misfits[k])
+    return TurnsFit(factor, turns.misfit(sense * factor, axes, _NEARLY_ALL), signs, as_recorded)
+
+
+_SENSES = ((-1, -1, -1), (-1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+"""Signs of gyros of which some are reversed, the likeliest first: a sense of all, one wire, two."""
 
 
 def _signed_permutations() -> tuple[Floats, ...]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.data.axes_and_units import DEGREE, fitting_scale
+from sdimu_calibration.core.data.axes_and_units import AS_RECORDED, DEGREE, NO_TURN, TurnsFit, fitting_scale
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
 
@@ -36,12 +37,15 @@ class Scale(NamedTuple):
         Number of zero.
     why : str
         By what it was recognised.
+    sign : tuple of int
+        1 or -1 of each axis.
     """
 
     unit: str
     counts: float
     bias: float
     why: str
+    sign: tuple[int, int, int] = AS_RECORDED
 
     @property
     def factor(self) -> float:
@@ -108,7 +112,7 @@ def _by_gravity(size: float) -> Scale | None:
 
 
 def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
-    """Recognise the unit of the rates by the turns.
+    """Recognise the unit and the signs of the rates by the turns.
 
     Parameters
     ----------
@@ -119,17 +123,32 @@ def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
     unit : str
         By the headings; empty where they say none.
     """
+    fit = fit_of_turns(w, f_ib_b, rate_hz, _factors(unit, rate_hz), any_sense=True)
+    scale = _rate_scale(w, fit, unit)
+    if fit.signs == AS_RECORDED:
+        return scale
+    return scale._replace(sign=fit.signs, why=f"{scale.why}; {_reversed_in_words(fit)}")
+
+
+def _factors(unit: str, rate_hz: float) -> tuple[float, ...]:
+    """Factors (rad/s of one number) that may be those of columns of gyros, with that of the unit of their headings."""
+    if unit and _dimension_is(unit, "rad"):
+        return (parse_unit(unit).factor * rate_hz,)
+    stated = (parse_unit(unit).factor,) if unit and _dimension_is(unit, "rad/s") else ()
+    return tuple(dict.fromkeys((*_FACTORS, *stated)))
+
+
+def _rate_scale(w: Floats, fit: TurnsFit, unit: str) -> Scale:
+    """Recognise the unit of the rates, shape (n, 3), by what fits their turns."""
     if unit and _dimension_is(unit, "rad"):
         return _stated(unit)
     unit = unit if unit and _dimension_is(unit, "rad/s") else ""
-    factor, left = fit_of_turns(w, f_ib_b, rate_hz)
-    if factor is not None:
-        found = _turned(factor, left)
-        if not unit or abs(parse_unit(unit).factor / found.factor - 1.0) < _NEAR:
-            return _stated(unit) if unit else found
-        return found._replace(why=f"{found.why}; the headings say {unit}, with which the turns do not fit: check it")
-    if unit:
+    if unit and (fit.factor is None or abs(parse_unit(unit).factor / fit.factor - 1.0) < _NEAR):
         return _stated(unit)
+    if fit.factor is not None:
+        found = _turned(fit.factor, fit.left)
+        doubt = f"; the headings say {unit}, with which the turns do not fit: check it" if unit else ""
+        return found._replace(why=found.why + doubt)
     usual = median_size(w)
     guess = "deg/s" if usual > _LARGEST_BIAS else "rad/s"
     return Scale(
@@ -140,32 +159,41 @@ def gyro_scale(w: Floats, f_ib_b: Floats, rate_hz: float, unit: str) -> Scale:
     )
 
 
+def _reversed_in_words(fit: TurnsFit) -> str:
+    """Say which gyros are reversed, and what shows it."""
+    axes = [axis for axis, sign in zip("xyz", fit.signs, strict=True) if sign < 0]
+    which = "all three" if len(axes) == len(fit.signs) else " and ".join(axes)
+    return (
+        f"the turns close with the opposite sign of {which} ({fit.left:.0%} of the change of gravity's direction is "
+        f"left, {fit.as_recorded:.0%} as recorded): this sign stands in the map; check it"
+    )
+
+
 _FACTORS = {1.0: ("rad/s", 1.0), DEGREE: ("deg/s", 1.0)} | {
     DEGREE / counts: ("deg/s", float(counts)) for counts in _COUNTS_PER_DPS
 }
 """SI of one number of gyros (rad/s), with the unit and the numbers of one unit."""
 
 
-def fit_of_turns(w: Floats, f: Floats, rate_hz: float) -> tuple[float | None, float]:
-    """Find the usual factor with which rates turn a force as it turns.
+def fit_of_turns(
+    w: Floats, f: Floats, rate_hz: float, factors: Sequence[float] = tuple(_FACTORS), any_sense: bool = False
+) -> TurnsFit:
+    """Find the factor with which rates turn a force as it turns.
 
     Parameters
     ----------
     w, f : ndarray, shape (n, 3)
         In any unit; rows that are not finite are left out.
-
-    Returns
-    -------
-    factor : float or None
-        rad/s of one number; None where no turn tells it.
-    left : float
-        Share of the change of direction that is left.
+    factors : sequence of float
+        rad/s of one number; the usual ones by default.
+    any_sense : bool
+        As for `fitting_scale`.
     """
     good = np.isfinite(w).all(axis=1) & np.isfinite(f).all(axis=1)
     if np.count_nonzero(good) < 2:
-        return None, 1.0
+        return NO_TURN
     t = np.arange(1, len(w) + 1) / rate_hz
-    return fitting_scale(t[good], w[good], f[good], tuple(_FACTORS))
+    return fitting_scale(t[good], w[good], f[good], factors, any_sense)
 
 
 def _turned(factor: float, left: float) -> Scale:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.data.axes_and_units import AS_RECORDED
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
@@ -177,4 +178,6 @@ def _sensor(key: str, names: Sequence[int | str], scale: Scale) -> list[str]:
         out.append(f"  bias: {scale.bias:g}")
     if scale.counts != 1.0:
         out.append(f"  counts_per_unit: {scale.counts:g}")
+    if scale.sign != AS_RECORDED:
+        out.append(f"  sign: [{_listed(scale.sign)}]")
     return out

@@ -96,13 +96,14 @@ def _explained(x: Floats, y: Floats) -> float:
 
 
 def _by_turns(numbers: Floats, rate_hz: float, pairs: Sequence[tuple[Three, Three]]) -> list[Pair]:
-    """Choose the force and the rates that turn together; none where no turn tells."""
-    fits = {}
-    for force, rate in pairs:
-        factor, left = fit_of_turns(numbers[:, list(rate)], numbers[:, list(force)], rate_hz)
-        if factor is not None:
-            of_gravity = is_gravity(median_size(numbers[:, list(force)]))
-            fits[force, rate] = (not of_gravity, left)
+    """Choose the force and the rates that turn together, by preference as they stand; none where no turn tells."""
+    fits: dict[tuple[Three, Three], tuple[bool, float]] = {}
+    for any_sense in (False, True):
+        for force, rate in () if fits else pairs:
+            fit = fit_of_turns(numbers[:, list(rate)], numbers[:, list(force)], rate_hz, any_sense=any_sense)
+            if fit.factor is not None:
+                of_gravity = is_gravity(median_size(numbers[:, list(force)]))
+                fits[force, rate] = (not of_gravity, fit.left)
     if not fits:
         return []
     best = min(fits, key=lambda pair: fits[pair])
