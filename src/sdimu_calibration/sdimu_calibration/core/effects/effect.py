@@ -137,6 +137,9 @@ class Effect:
         diagnosed together; ``request``: nowhere. Every effect that is tried raises the threshold of all others.
     family : str
         Registry name of the effect of which this is a part; empty for whole effects.
+    contained_in : str
+        Registry name of a larger effect that has these terms among its own: an IMU file that states a prior of it, and
+        none of this one, states it of these terms; empty: none.
     needs : str
         ``temperature``, ``magnetic`` or empty: what must be recorded or known for the effect to mean anything.
     options : mapping of str to str
@@ -179,6 +182,7 @@ class Effect:
     needs: str = ""
     tried_in: Literal["recording", "set", "request"] = "recording"
     family: str = ""
+    contained_in: str = ""
     options: Mapping[str, str] = field(default_factory=dict)
     with_options: Callable[..., Effect] | None = None
     scan: Callable[[Timetable], tuple[Effect, ...]] | None = None

@@ -261,8 +261,12 @@ def with_serving(
 
 
 def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:
-    """One-sigma (SI) of each parameter of an effect: of the IMU file, else of its grade; None where neither has it."""
-    return imu.prior.get(effect.family or effect.name, effect.prior.get(imu.grade))
+    """One-sigma (SI) of each parameter of an effect; None where nothing states it.
+
+    The IMU file states it of the effect, or of a larger one that contains it; else the grade does.
+    """
+    stated = (imu.prior[name] for name in (effect.family or effect.name, effect.contained_in) if name in imu.prior)
+    return next(stated, effect.prior.get(imu.grade))
 
 
 def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:
