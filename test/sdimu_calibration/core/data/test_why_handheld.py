@@ -148,3 +148,25 @@ def test_priors_of_a_proposal_allow_the_biases_of_the_rests():
     assert found.prior["accel_bias"] > 0.9
     assert found.prior["accel_scale"] == FILES[-1].prior["accel_scale"]
     assert "priors for such biases" in note
+
+
+def test_a_proposal_in_more_noise_than_the_default_has_that_of_the_rests():
+    as_filed, _ = propose(on_table("dtg"), FILES)
+    assert as_filed == FILES[0]
+    noisier, note = propose(on_table("rlg_navigation"), FILES)
+    assert noisier.name == "dtg"
+    assert noisier.gyro_white_noise == pytest.approx(load_imu("rlg_navigation").gyro_white_noise, rel=0.1)
+    assert "with this noise" in note
+
+
+def test_the_noise_of_the_rests_is_not_the_least_of_several_by_chance():
+    imu, ratios = load_imu("mems_consumer"), []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        white = rng.standard_normal((2, 4000, 3)) * np.sqrt(20.0)
+        rate = imu.gyro_white_noise * white[0]
+        force = [0.0, 0.0, 9.8] + imu.accel_white_noise * white[1]
+        shown = shown_at_rest(Recording(0, 0.05 * np.arange(1, 4001), rate, force))
+        ratios.append([shown.gyro_noise / imu.gyro_white_noise, shown.accel_noise / imu.accel_white_noise])
+    # 400 differences of three axes give the noise to 2.5 %, sixty of them its mean to 0.3 %.
+    assert abs(np.mean(ratios) - 1.0) < 0.015

@@ -1,8 +1,8 @@
 """Which of some IMU files a recording is of, where nobody states one: told by the noise and the biases of its rests.
 
 Noise tells the grade of the gyros and no more. A file whose limits of rest the rests exceed is none of theirs:
-the next coarser one is taken. What is taken in place of the default has the priors of its grade, wider where the rests
-show larger biases, and the noise of the rests.
+the next coarser one is taken. What is taken in place of the default, or in more noise than the default's, has the
+priors of its grade, wider where the rests show larger biases, and the noise of the rests.
 """
 
 from __future__ import annotations
@@ -27,6 +27,11 @@ _TAU_S = (2.0, 8.0)
 """Averaging times (s) beside the half second of static detection: long enough for pulses of a ring laser gyro."""
 _FEWEST = 20
 """Number of differences of neighbouring means at least: of three axes they give the noise to a tenth."""
+_BY_CHANCE = 4.0
+"""Distance (sigma) by which noise over a longer time is below that of a shorter one to count: the least of three
+numbers is else too small by chance, and the model then seems not to fit."""
+_AS_STATED = 1.3
+"""Ratio of noise to that of the default up to which the default's is taken: units of one type differ by less."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,11 @@ class RestsShown:
         limits = rest_limits(imu)
         return self.rate < limits.rate and self.force_error < limits.force
 
+    def no_noisier_than(self, imu: ImuSpecification) -> bool:
+        """Whether the white noise of the rests is that of a specification, or less."""
+        pairs = ((self.gyro_noise, imu.gyro_white_noise), (self.accel_noise, imu.accel_white_noise))
+        return all(seen < _AS_STATED * stated for seen, stated in pairs)
+
     def of_class(self, imu: ImuSpecification) -> ImuSpecification:
         """Return a specification with this noise and with priors that allow these biases."""
         seen = {
@@ -94,26 +104,29 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
         for data in (recording.omega_ib_b, recording.f_ib_b)
     )
     gyro, accel = (
-        min([usual, *_densities(data, found, recording.interval_s)])
+        _white_noise(data, found, recording.interval_s, usual)
         for data, usual in ((recording.omega_ib_b, found.gyro_white_noise), (recording.f_ib_b, found.accel_white_noise))
     )
     error = np.abs(force - STANDARD_GRAVITY)
     return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
 
 
-def _densities(values: Floats, rests: StaticIntervals, interval_s: float) -> list[float]:
-    """Noise density of a triad by neighbouring means over each of `_TAU_S`, where there are enough of them.
+def _white_noise(values: Floats, rests: StaticIntervals, interval_s: float, usual: float) -> float:
+    """Noise density of a triad: `usual`, or that of neighbouring means over each of `_TAU_S` where it is clearly less.
 
     Quantisation and vibration let it fall with the length of the means, a wandering bias lets it rise: the least one is
     nearest to white noise.
     """
-    out = []
+    least = usual
     for tau in _TAU_S:
         width = max(round(tau / interval_s), 1)
         variance, count = two_sample_variance(values, rests.first, rests.last, width)
         if count >= _FEWEST:
-            out.append(float(np.sqrt(variance * width * interval_s)))
-    return out
+            density = float(np.sqrt(variance * width * interval_s))
+            # Of `count` differences of three axes, neighbours correlated by a half, the share of one sigma.
+            chance = 0.5 / np.sqrt(count)
+            least = density if density * (1.0 + _BY_CHANCE * chance) < least else least
+    return least
 
 
 def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[ImuSpecification, str]:
@@ -129,7 +142,7 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
     Returns
     -------
     imu : ImuSpecification
-        One of `classes`; with the noise and the biases of the rests where it is not the first.
+        One of `classes`; with the noise and the biases of the rests where it is not the first, or they are noisier.
     note : str
         What was assumed, and why.
     """
@@ -142,11 +155,10 @@ def propose(recording: Recording, classes: Sequence[ImuSpecification]) -> tuple[
     while grade < len(classes) - 1 and not shown.fits(classes[grade]):
         grade += 1
     imu = classes[grade]
-    with_what = "" if grade == 0 else " with this noise and priors for such biases"
+    as_it_is = grade == 0 and shown.no_noisier_than(imu)
+    with_what = "" if as_it_is else " with this noise and priors for such biases"
     note = (
         f"no {Option.IMU}: {imu.name} is assumed{with_what}, as the rests show {shown}; state your own file if there "
         "is one"
     )
-    if grade == 0:
-        return imu, note
-    return shown.of_class(imu), note
+    return (imu if as_it_is else shown.of_class(imu)), note
