@@ -33,6 +33,21 @@ class FitStatistics:
     held_out_in_noise: float | None = None
     held_out_rms: float | None = None
 
+    def judged(self, may_be_an_effect: bool) -> tuple[float, float | None]:
+        """Return the NIS and the held-out error (1) that judge the fit.
+
+        They are those in the noise that was learned. Those in white noise judge where this noise may be a missing
+        effect.
+
+        Parameters
+        ----------
+        may_be_an_effect : bool
+            As `noise_term.may_be_an_effect` says of the noise that was learned.
+        """
+        if self.nis_in_noise is None or may_be_an_effect:
+            return self.nis_mean, self.held_out_rms
+        return self.nis_in_noise, self.held_out_in_noise
+
     def entries(self) -> dict[str, float | None]:
         """Give them as a result holds them; figures in noise that was not learned are left out."""
         return {k: v for k, v in asdict(self).items() if v is not None or not k.endswith("_in_noise")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -104,6 +105,14 @@ class NoiseTerm:
     def display_unit(self) -> str:
         """Unit in which people read the size."""
         return ("deg/h" if self.triad == "gyro" else "ug") + ("/sqrt(h)" if self.kind == RANDOM_WALK else "")
+
+
+def may_be_an_effect(terms: Sequence[NoiseTerm]) -> bool:
+    """Whether a missing effect may be taken for one of these terms.
+
+    What is drawn anew at each stop or turn explains any error that depends on attitude or rate.
+    """
+    return any(term.kind in DRAWN for term in terms)
 
 
 def sensors_of(triad: str, axes: tuple[int, ...]) -> str:

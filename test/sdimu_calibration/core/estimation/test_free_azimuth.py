@@ -11,6 +11,7 @@ import pytest
 from sdimu_calibration.core.adaptive.so_far import so_far
 from sdimu_calibration.core.effects.earth_rate import NAMES
 from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost, azimuth_sigma
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.solve import extend, fit_about, solve
 from sdimu_calibration.core.joint.member import Job, Member, run
@@ -55,12 +56,21 @@ def test_flicker_as_large_as_earth_rate_hides_the_azimuth_and_says_so(hidden):
 
 def test_a_misfit_is_told_of_white_noise_and_right_at_one_is_the_other(hidden):
     fit, _ = hidden[0]
-    (told,) = (line for line in fit.warnings(replace(fit.statistics(), held_out_rms=7.0)) if "the model" in line)
+    found = replace(fit.statistics(), held_out_rms=7.0, held_out_in_noise=2.0)
+    (told,) = (line for line in fit.warnings(found) if "the model" in line)
     assert told.startswith("the model in white noise does not fit (NIS ")
-    assert f"held-out error {fit.noise.held_out_rms:.3f}, 1 is right" in told
+    assert "held-out error 2.000, 1 is right" in told
     bare = fit.with_noise(None)
     (white,) = (line for line in bare.warnings(replace(bare.statistics(), nis_mean=2.0)) if "the model" in line)
     assert white.startswith("the model does not fit (NIS 2.000; 1 is right)")
+
+
+def test_a_result_whose_noise_explains_the_data_is_no_misfit(hidden):
+    for fit, _ in hidden:
+        result = outcome(fit)
+        assert result.fit["nis_mean"] > MISFIT
+        assert not result.misfits
+        assert any("the noise is not white" in note for note in result.notes)
 
 
 def test_the_coefficients_are_right_without_an_azimuth(hidden):

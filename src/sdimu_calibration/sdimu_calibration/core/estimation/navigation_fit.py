@@ -34,7 +34,7 @@ from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.filter.passes import Pass, Solution
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault
@@ -419,10 +419,11 @@ class NavigationFit(Fit):
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification."""
-        nis, held_out = statistics.nis_mean, statistics.held_out_rms
         white = "" if self.noise is None else " in white noise"
         out: list[str] = [] if self.converged else [NOT_CONVERGED]
-        if nis > MISFIT or (held_out is not None and held_out > MISFIT):
+        judged = statistics.judged(may_be_an_effect(self.noise_terms))
+        if any(figure is not None and figure > MISFIT for figure in judged):
+            nis, held_out = statistics.nis_mean, statistics.held_out_rms
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
