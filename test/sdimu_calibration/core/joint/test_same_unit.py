@@ -12,6 +12,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.joint.member import Job, Member, Report
 from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.set_fit import fit_set
+from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
@@ -22,6 +23,8 @@ from .conftest import SITE, InMemory, here, short, unit_set
 AS_GIVEN = np.eye(3)
 TURNED = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Axes x, y, z of a recording are y, -x, z of the unit."""
+SIDEWAYS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""The axis of the turns is another one: what both recordings tell of the unit are few coefficients."""
 
 
 @pytest.fixture(scope="module")
@@ -146,3 +149,23 @@ def test_a_set_of_a_cheap_imu_is_refused_before_physics_is_sought(options):
     members = [Member(f"r{k}", InMemory(test)) for k, test in enumerate(tests)]
     with pytest.raises(DataError, match="'r0' and 'r1' are of two units"):
         fit_set(members, options, here)
+
+
+@pytest.fixture(scope="module")
+def three_stops():
+    """Recordings of one unit with two turns about one axis each, and one more in turned axes."""
+    own = unit_set(34, [short(stops=3)] * 3).members
+    return here([Job(m, load_model("baseline")) for m in (*own, in_axes(own[0], SIDEWAYS))])
+
+
+def test_what_the_data_do_not_tell_of_the_axes_is_said(three_stops):
+    assert check_one_unit(three_stops[:3]) == ""
+    told = check_one_unit([three_stops[0], three_stops[3], three_stops[2]])
+    assert told.startswith("the data do not tell whether 'strange' is of the unit that the others are of")
+
+
+def test_a_set_says_that_its_axes_are_not_told(options):
+    own = unit_set(34, [short(stops=3)] * 3).members
+    fit = fit_set((own[1], own[2], in_axes(own[0], SIDEWAYS)), options, here)
+    assert "whether 'strange' is of the unit" in fit.unit_doubt
+    assert fit.unit_doubt in set_outcome(fit).notes

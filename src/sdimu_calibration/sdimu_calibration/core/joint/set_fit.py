@@ -75,6 +75,8 @@ class SetFit:
         Names of the recordings in the order of the user.
     function : SharedFunction or None
         Unknown function of the attitude beside which the estimate stands.
+    unit_doubt : str
+        Which recording may be of another unit; empty where the data tell that none is.
     """
 
     members: tuple[Member, ...]
@@ -89,6 +91,7 @@ class SetFit:
     left_out: tuple[tuple[str, str], ...] = ()
     asked: tuple[str, ...] = ()
     function: SharedFunction | None = None
+    unit_doubt: str = ""
 
     @cached_property
     def power_ons(self) -> tuple[str, ...]:
@@ -187,8 +190,7 @@ def fit_set(
     check_different(reports)
     check_one_grade(reports)
     check_one_site(reports)
-    if before is None:
-        check_one_unit(reports)
+    doubt = check_one_unit(reports) if before is None else before.unit_doubt
     reports = _one_estimator(members, options, reports, run)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
@@ -217,7 +219,8 @@ def fit_set(
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
         raise DataError(f"only one of {len(members)} recordings can be used, and a set needs two ({why})")
     late = {name: r for name, r in late.items() if name not in left}
-    return replace(_noise_of(late, fit, options, run) if late else fit, left_out=tuple(left.items()))
+    fit = _noise_of(late, fit, options, run) if late else fit
+    return replace(fit, left_out=tuple(left.items()), unit_doubt=doubt)
 
 
 def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run: Run) -> SetFit:

@@ -151,7 +151,8 @@ def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
     scatter = [_scatter(t) for t in with_units(fit, base)]
     files = sorted({r.imu.name for r in fit.reports})
     mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
-    return (*mixed, *of_one, *_beside(fit), *scatter, *_told(fit, [r.notes for r in fit.reports]))
+    doubt = [fit.unit_doubt] if fit.unit_doubt else []
+    return (*mixed, *doubt, *of_one, *_beside(fit), *scatter, *_told(fit, [r.notes for r in fit.reports]))
 
 
 def _beside(fit: SetFit) -> list[str]:
