@@ -110,9 +110,10 @@ class NoiseTerm:
 def may_be_an_effect(terms: Sequence[NoiseTerm]) -> bool:
     """Whether a missing effect may be taken for one of these terms.
 
-    What is drawn anew at each stop or turn explains any error that depends on attitude or rate.
+    What is drawn anew at each stop or turn explains any error that depends on attitude or rate, and Markov noise as
+    long as a stop takes the sensitivity of a gyro to force. Bias instability and random walk are in data sheets.
     """
-    return any(term.kind in DRAWN for term in terms)
+    return any(term.kind not in {FLICKER, RANDOM_WALK} for term in terms)
 
 
 def sensors_of(triad: str, axes: tuple[int, ...]) -> str:

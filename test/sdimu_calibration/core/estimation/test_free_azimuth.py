@@ -66,11 +66,11 @@ def test_a_misfit_is_told_of_white_noise_and_right_at_one_is_the_other(hidden):
 
 
 def test_a_result_whose_noise_explains_the_data_is_no_misfit(hidden):
-    for fit, _ in hidden:
-        result = outcome(fit)
-        assert result.fit["nis_mean"] > MISFIT
-        assert not result.misfits
-        assert any("the noise is not white" in note for note in result.notes)
+    fit = next(fit for fit, _ in hidden if {term.kind for term in fit.noise_terms} == {"flicker"})
+    result = outcome(fit)
+    assert result.fit["nis_mean"] > MISFIT
+    assert not result.misfits
+    assert any("the noise is not white" in note for note in result.notes)
 
 
 def test_the_coefficients_are_right_without_an_azimuth(hidden):

@@ -18,7 +18,6 @@ from sdimu_calibration.core.joint.member import Report, fitted
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
-from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.results import (
@@ -218,10 +217,9 @@ def _beyond(fit: SetFit, base: Fit) -> list[str]:
 
 
 def _misfit(fit: SetFit) -> list[Note]:
-    """Name the recordings whose innovations are larger than their noise makes them, the worst first."""
-    judged = {r.name: r.statistics.judged(may_be_an_effect(r.noise))[0] for r in fit.reports}
-    nis = {r.name: r.statistics.nis_mean for r in fit.reports if judged[r.name] > MISFIT}
-    bad = sorted(nis, key=lambda name: -nis[name])
+    """Name the recordings whose innovations are larger than white noise makes them, the worst first."""
+    nis = {r.name: r.statistics.nis_mean for r in fit.reports}
+    bad = sorted((name for name, value in nis.items() if value > MISFIT), key=lambda name: -nis[name])
     if not bad:
         return []
     told = ", ".join(f"{name} {nis[name]:.3g}" for name in bad[:_LISTED]) + (" and others" if bad[_LISTED:] else "")
