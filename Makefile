@@ -60,21 +60,26 @@ check-types: setup
 # the longest files come first (test/sharing.py). All tests run with the kernels of OpenBLAS for AVX2, on a machine that
 # has others, too: the same digits wherever a test runs.
 test: export OPENBLAS_CORETYPE = Haswell
-test: check
+test: check-style
+	$(MAKE) --no-print-directory -j 2 check-types test-run
+
+# Types keep one core busy for half a minute: the tests go on beside them.
+test-run: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
 
 # The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
-# Nodes wait for each other more than they work: they run beside what keeps both cores busy.
-thorough: export OPENBLAS_CORETYPE = Haswell
+# Nodes wait for each other more than they work: they run beside what keeps both cores busy. A third worker of the rest
+# works where another one waits for a browser.
 thorough: setup
 	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest
 
+thorough-nodes thorough-rest: export OPENBLAS_CORETYPE = Haswell
 thorough-nodes: export SDIMU_FIRST_DOMAIN = 70
 thorough-nodes: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench"
 
 thorough-rest: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
+	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
 # What linear algebra decides, with other kernels of OpenBLAS (without AVX) than in `test` and `thorough`: no test stands on
 # the last digits of a library.
@@ -128,6 +133,8 @@ mutants: setup
 	$(BIN)/python test/mutants.py
 
 # The book, out/docs/index.html: it is read without a network. Every warning is an error.
+docs-setup: $(BOOK)
+
 docs: $(BOOK)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 
@@ -154,4 +161,4 @@ lock: setup
 	$(BIN)/python requirements/lock.py
 	$(BIN)/python requirements/vendored.py
 
-.PHONY: setup demo check check-style check-types test thorough thorough-nodes thorough-rest other-blas colcon wheels bench study mutations mutants docs faults grades pictures campaigns lock
+.PHONY: setup demo check check-style check-types test test-run thorough thorough-nodes thorough-rest other-blas colcon wheels bench study mutations mutants docs docs-setup faults grades pictures campaigns lock

@@ -50,17 +50,24 @@ def test_what_make_test_leaves_out_is_run_by_ci_and_decides_there():
     assert '-m "not thorough and not slow and not bench"' in make
     assert '-m "thorough and ros and not slow and not bench"' in make
     assert '-m "thorough and not ros and not slow and not bench"' in make
-    for line in ("make test", "make -j 3 colcon docs other-blas", "make thorough"):
+    beside = "make -j 5 --output-sync=target thorough-nodes thorough-rest colcon docs other-blas"
+    for line in ("make test", beside):
         # Alone on its line: nothing takes its failure away.
         assert f"\n{line}\n" in ci
 
 
 def test_what_runs_with_one_kernel_of_linear_algebra_elsewhere_runs_with_another_in_other_blas():
     make = (ROOT / "Makefile").read_text()
-    assert "\nthorough: export OPENBLAS_CORETYPE = Haswell\n" in make
+    assert "\nthorough-nodes thorough-rest: export OPENBLAS_CORETYPE = Haswell\n" in make
     assert "\ntest: export OPENBLAS_CORETYPE = Haswell\n" in make
     assert "\nother-blas: export OPENBLAS_CORETYPE = Nehalem\n" in make
     assert '-m "not slow and not bench"' in make.split("\nother-blas: setup\n")[1].partition("\n\n")[0]
+
+
+def test_make_test_holds_style_types_and_tests():
+    make = (ROOT / "Makefile").read_text()
+    assert "\ntest: check-style\n\t$(MAKE) --no-print-directory -j 2 check-types test-run\n" in make
+    assert '-m "not thorough and not slow and not bench"' in make.split("\ntest-run: setup\n")[1].partition("\n\n")[0]
 
 
 def test_thorough_makes_both_of_its_parts():
