@@ -29,6 +29,7 @@ TOGETHER = {
 
 LONGEST = (
     "test/browser/test_workbench_in_a_browser.py",
+    "test/browser/test_workbench_page_in_a_browser.py",
     "test/book/test_blocks.py",
     "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
     "test/sdimu_calibration/core/joint/test_set_search.py",

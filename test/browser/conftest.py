@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import os
+import math
 import select
 import shutil
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.storage.files.config import load_plan
+from sdimu_calibration.storage.files.plan_file import write_plan
 
 START_S = 300.0  # a first run on a new machine compiles
 PLACES = ("chromium", "chromium-browser", "google-chrome")
@@ -29,11 +34,20 @@ FLAGS = (
 )
 HIDDEN = "accel_quadratic_x"
 SEED = 5
-SIZE = "40 ug/g^2"  # forty times what this plan sees at one sigma
+SIZE = "40 ug/g^2"  # twenty-five times what the quick plan sees at one sigma
+DWELL_S, RATE_RAD_S = 40.0, math.radians(9.0)
+"""The attitudes of the default plan in a third of its time: no claim about the page hangs on how long a stop is."""
 
 
 def sdimu(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)]
+
+
+def quick_plan() -> Plan:
+    """Plan the attitudes of the default plan with short stops and quick turns."""
+    plan = load_plan("kim18")
+    turns = tuple(replace(turn, rate_rad_s=RATE_RAD_S) for turn in plan.turns)
+    return Plan("quick", (DWELL_S,) * len(plan.dwell_s), turns, RATE_RAD_S)
 
 
 @dataclass
@@ -61,13 +75,22 @@ def browser() -> Iterator[Any]:
 def workbench(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workbench]:  # noqa: ARG001
     """A recording with a hidden effect, and a broken one beside it."""
     folder = tmp_path_factory.mktemp("recordings")
-    bag = folder / "hidden"
-    making = sdimu("simulate", "--rate", 20, "--seed", SEED, "--effect", f"{HIDDEN}={SIZE}", "--out", bag)
+    bag, plan = folder / "hidden", tmp_path_factory.mktemp("plan") / "quick.yaml"
+    write_plan(plan, quick_plan())
+    given = ("--plan", plan, "--rate", 20, "--seed", SEED, "--effect", f"{HIDDEN}={SIZE}")
+    making = sdimu("simulate", *given, "--out", bag)
     subprocess.run(making, check=True, capture_output=True, timeout=START_S)
     (folder / "broken.mcap").write_bytes(b"this is no recording")
-    port = 20000 + os.getpid() % 20000
+    port = free_port()
     with serving(port, bag):
         yield Workbench(f"http://127.0.0.1:{port}/", folder, bag)
+
+
+def free_port() -> int:
+    """Find a port that nobody listens on: two workers serve at once."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 @contextmanager

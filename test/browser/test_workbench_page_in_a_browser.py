@@ -1,0 +1,193 @@
+"""The page of the workbench: its figures and their axes, windows of other sizes, keys, and rules of access."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from .bench_page import add_first, choose, click_cell, drawn, held_out, text
+from .conftest import DWELL_S, HIDDEN, click_bar, settle
+
+
+def test_a_click_on_a_cell_shows_that_stop_and_channel(visit: Callable[[], Any]) -> None:
+    page = visit()
+    click_cell(page, "accel x", "7")
+    page.locator("#residuals .gtitle", has_text="accel x at stop 7").wait_for()
+    settle(page)
+
+
+def test_stops_held_out_are_predicted(visit: Callable[[], Any]) -> None:
+    page = visit()
+    choose(page, "held", "stop 5")
+    page.locator("#hold").click()
+    page.locator("#numbers", has_text="of what is left out").wait_for()
+    settle(page)
+    assert "5" not in drawn(page, "heat", "x")
+
+
+def test_a_coefficient_is_edited_in_its_row_beside_the_heat_map(visit: Callable[[], Any]) -> None:
+    page = visit()
+    drawer = page.locator("#drawer")
+    assert drawer.is_hidden()
+    page.keyboard.press("c")
+    row = page.locator("tr[data-coefficient=accel_bias_y]")
+    row.locator("button").click()
+    page.wait_for_function("document.getElementById('mean').value.endsWith(' ug')")
+    inside, place = row.bounding_box(), page.locator("#editor").bounding_box()
+    assert inside["y"] < place["y"]
+    assert place["y"] + place["height"] <= inside["y"] + inside["height"] + 1.0
+    assert page.locator("#heat").bounding_box()["y"] < drawer.bounding_box()["y"]  # the map is still seen
+    page.locator("#mean").fill("110 ug")
+    page.locator("#sigma").fill("5")
+    page.locator("#sigma").press("Enter")
+    # Other rows keep the prior of the IMU's file.
+    row.filter(has_text="free, own prior").wait_for()
+    settle(page)
+    assert "110 \N{PLUS-MINUS SIGN} 5" in row.inner_text()
+    # The table is another one: its row is open again, with the controls in it.
+    inside, place = row.bounding_box(), page.locator("#editor").bounding_box()
+    assert place["y"] + place["height"] <= inside["y"] + inside["height"] + 1.0
+    page.keyboard.press("Escape")
+    drawer.wait_for(state="hidden")
+
+
+def test_in_a_narrow_window_the_candidate_stands_beside_the_map_and_numbers_only_where_they_fit(
+    visit: Callable[[], Any],
+) -> None:
+    page = visit()
+    written = (
+        "document.querySelector('#heat .js-plotly-plot')._fullData[0].text.flat().filter(t => /[0-9]/.test(t)).length"
+    )
+    assert page.evaluate(written) > 100
+    page.set_viewport_size({"width": 800, "height": 1000})
+    page.wait_for_function(f"{written} === 0")
+    settle(page)
+    page.keyboard.press("j")
+    page.locator("#candidate-name").wait_for()
+    settle(page)
+    heat, candidate = page.locator("#heat").bounding_box(), page.locator("#preview").bounding_box()
+    assert candidate["x"] >= heat["x"] + heat["width"]
+    assert heat["y"] - 150 < candidate["y"] < heat["y"] + heat["height"] / 2
+
+
+def test_every_axis_says_its_unit(visit: Callable[[], Any]) -> None:
+    page = visit()
+    for name in ("heat", "residuals", "ladder", "ranking"):
+        titles = page.evaluate(
+            "name => { const l = document.querySelector(`#${name} .js-plotly-plot`)._fullLayout;"
+            " return [l.xaxis, l.yaxis].map(a => [a.type, a.title?.text ?? '']); }",
+            name,
+        )
+        for kind, title in titles:
+            # Names on an axis have no unit, but say what they are names of.
+            assert re.search(r"\w" if kind == "category" else r"\(.+\)$", title), (name, title)
+
+
+def test_ranking_heat_map_residuals_and_ladder_stand_in_one_view(visit: Callable[[], Any]) -> None:
+    page = visit()
+    page.set_viewport_size({"width": 1440, "height": 900})
+    inside = (
+        "(height) => ['heat', 'residuals', 'ladder', 'ranking', 'verdict', 'add'].every(name => {"
+        " const box = document.getElementById(name).getBoundingClientRect();"
+        " return box.height > 0 && box.top >= 0 && box.bottom <= height; })"
+    )
+    # Figures are drawn anew after the window has its size: what is asked must hold when nothing moves any more.
+    page.wait_for_function(inside, arg=900)
+    settle(page)
+    assert page.evaluate(inside, 900)
+    for width in (800, 390):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
+        settle(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Callable[[], Any]) -> None:
+    page = visit()
+    click_bar(page, 0)
+    page.locator("#candidate-name").wait_for()
+    said = text(page, "preview")
+    assert "df_i = K2_i a_i^2" in said
+    words = r"Error with one stop left out ([\d.]+) \N{RIGHTWARDS ARROW} ([\d.]+)"
+    before, after = map(float, re.search(words, said).groups())
+    assert before == held_out(page)
+    page.locator("#residuals .legendtext", has_text=f"{HIDDEN} would take").wait_for()
+    page.locator("#add").click()
+    page.locator("#numbers", has_text="\N{RIGHTWARDS ARROW}").wait_for()
+    settle(page)
+    # The linear model told it before.
+    assert held_out(page) == pytest.approx(after, abs=0.01)
+
+
+def test_before_and_after_are_shown_by_a_key_on_the_same_cells(visit: Callable[[], Any]) -> None:
+    page = visit()
+    given = drawn(page, "heat", "z.map(r => Array.from(r))")
+    add_first(page)
+    page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
+    settle(page)
+    now = drawn(page, "heat", "z.map(r => Array.from(r))")
+    assert now != given
+    page.locator("h1").click()
+    page.keyboard.press("b")
+    page.keyboard.press("b")
+    page.wait_for_function("document.querySelector('#shows input').checked")
+    settle(page)
+    page.wait_for_function(
+        "given => JSON.stringify(Array.from(document.querySelector('#heat .js-plotly-plot')._fullData[0]"
+        ".z.map(r => Array.from(r)))) === JSON.stringify(given)",
+        arg=given,
+    )
+    assert drawn(page, "heat", "x") == [str(stop) for stop in range(19)]
+
+
+def test_undo_redo_and_help_by_keyboard(visit: Callable[[], Any]) -> None:
+    page = visit()
+    page.keyboard.press("j")
+    page.locator("#candidate-name").wait_for()
+    page.keyboard.press("a")
+    page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
+    settle(page)
+    page.keyboard.press("Control+z")
+    page.locator("#verdict", has_text="\N{WARNING SIGN}").wait_for()
+    settle(page)
+    page.keyboard.press("Control+y")
+    page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
+    settle(page)
+    page.keyboard.press("?")
+    page.locator("#help", has_text="Ctrl+Z").wait_for()
+    page.keyboard.press("Escape")
+    page.locator("#help").wait_for(state="hidden")
+    # Letters that are written into a field are no keys.
+    page.locator("#own").click()
+    page.keyboard.type("u")
+    page.wait_for_timeout(500)
+    assert text(page, "verdict").startswith("\N{CHECK MARK}")
+
+
+def test_residuals_are_drawn_against_what_is_chosen(visit: Callable[[], Any]) -> None:
+    page = visit()
+    page.get_by_text("all", exact=True).click()
+    choose(page, "against", "roll (deg)")
+    page.wait_for_function(
+        "document.querySelector('#residuals .js-plotly-plot')._fullLayout.xaxis.title.text === 'roll (deg)'"
+    )
+    settle(page)
+    roll = drawn(page, "residuals", "x")
+    # More than ten of the nineteen stops have.
+    assert len(roll) > 10 * DWELL_S
+    assert max(map(abs, roll)) <= 180.0
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_page_breaks_no_serious_rule_of_access(visit: Callable[[], Any], theme: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="no axe-core here (make setup)")
+    page = visit()
+    page.emulate_media(color_scheme=theme)
+    page.keyboard.press("j")
+    page.locator("#candidate-name").wait_for()
+    settle(page)
+    found = axe.Axe().run(page).response["violations"]
+    assert [(rule["id"], rule["nodes"][0]["html"]) for rule in found if rule["impact"] in {"serious", "critical"}] == []
