@@ -117,11 +117,12 @@ class Run:
     output: str
 
 
-def runs(root: Path, number: int, dwell_s: float = DWELL_S) -> list[Run]:
-    """Run the same test several times at once."""
+def runs(root: Path, number: int, dwell_s: float = DWELL_S, *more: str) -> list[Run]:
+    """Run the same test several times at once, with more options."""
     plan = write_plan(root / "plan.yaml", dwell_s)
     folders = [root / f"run{k}" for k in range(number)]
-    processes = [sdimu("run", "--plan", plan, "--rate", RATE_HZ, "--seed", 5, "--out", folder) for folder in folders]
+    given = ("--plan", plan, "--rate", RATE_HZ, "--seed", 5, *more)
+    processes = [sdimu("run", *given, "--out", folder) for folder in folders]
     done = []
     for folder, process in zip(folders, processes, strict=True):
         try:

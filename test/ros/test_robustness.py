@@ -21,22 +21,34 @@ pytestmark = pytest.mark.ros
 
 NODES = ("recorder", "calibration", "sdimu", "rate_table")
 INTERVAL_NS = 10**9 // RATE_HZ
+OWN = """format: sdimu-effect/1
+name: coupling
+title: force times rate
+expressions: {accel_z: k1 * ax * wz}
+parameters:
+  k1: {unit: ug*s/deg/g, prior: 50 ug*s/deg/g}
+"""
 
 
-@pytest.mark.parametrize("late", NODES)
-def test_a_node_may_come_late_and_nothing_is_lost(bench: FitSession, late: str) -> None:
+@pytest.mark.parametrize("order", [NODES, NODES[::-1]], ids=["table last", "recorder last"])
+def test_a_node_may_come_late_and_nothing_is_lost(bench: FitSession, order: tuple[str, ...]) -> None:
+    """Of each two nodes either comes late in one of the orders; the live node estimates what `--add` would."""
     dwell_s = 12.0
     write_plan(bench.plan, dwell_s)
-    for name in NODES:
-        if name != late:
-            bench.start(name)
-    time.sleep(2.0)
-    bench.start(late)
+    own = bench.folder / "coupling.yaml"
+    own.write_text(OWN, encoding="utf-8")
+    added = {"calibration": {"add": ["gyro_scale_asymmetry_x", "gyro_x: ey^2", str(own)]}}
+    for name in order:
+        bench.start(name, **added.get(name, {}))
+        time.sleep(2.0)
     bench.wait_for_end()
     stamps = imu_stamps(bench.folder / "bag")
     assert len(stamps) == samples_of(dwell_s)
     assert set(np.diff(stamps)) == {INTERVAL_NS}
-    assert read_result(bench.folder).data["samples"] == samples_of(dwell_s)
+    result = read_result(bench.folder)
+    assert result.data["samples"] == samples_of(dwell_s)
+    # A name, an equation and a file in one parameter.
+    assert result.names[-3:] == ("gyro_scale_asymmetry_x", "gyro_x: ey^2", "coupling_k1")
 
 
 def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench: FitSession) -> None:
