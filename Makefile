@@ -75,8 +75,9 @@ thorough: setup
 
 thorough-nodes thorough-rest: export OPENBLAS_CORETYPE = Haswell
 thorough-nodes: export SDIMU_FIRST_DOMAIN = 70
+# Two folders hold all of them: to import the others would take each worker 5 s.
 thorough-nodes: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book
 
 thorough-rest: setup
 	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and not ros and not slow and not bench"

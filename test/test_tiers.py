@@ -64,6 +64,15 @@ def test_what_runs_with_one_kernel_of_linear_algebra_elsewhere_runs_with_another
     assert '-m "not slow and not bench"' in make.split("\nother-blas: setup\n")[1].partition("\n\n")[0]
 
 
+def test_the_folders_that_thorough_nodes_is_given_hold_every_test_over_dds():
+    marked = {path for path in ROOT.glob("test/**/test_*.py") if "pytest.mark.ros" in path.read_text(encoding="utf-8")}
+    make = (ROOT / "Makefile").read_text()
+    given = make.split('-m "thorough and ros and not slow and not bench"')[1].partition("\n")[0].split()
+    places = [ROOT / folder for folder in given]
+    assert len(marked) > 10
+    assert not [path for path in marked - {Path(__file__)} if not any(path.is_relative_to(place) for place in places)]
+
+
 def test_make_test_holds_style_types_and_tests():
     make = (ROOT / "Makefile").read_text()
     assert "\ntest: check-style\n\t$(MAKE) --no-print-directory -j 2 check-types test-run\n" in make
