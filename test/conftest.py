@@ -13,16 +13,15 @@ import pytest
 from sharing import longest_first, sharing
 from tiers import COLLECTED, is_thorough
 
-from rate_table_sim.core import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.origin import Origin
-from sdimu_calibration.core.recording import Recording, TableLog
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.report.report_extras import ReportExtras, report_extras
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
-from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.result_file import write_result
 
 START_NS = 1_700_000_000_000_000_000
@@ -168,29 +167,13 @@ def batch(tmp_path: Path) -> Callable[..., Path]:
     return make
 
 
-HIDDEN = "accel_quadratic_x"
-SEED = 5
-ANGLES = np.radians([[0.0, -30.0], [720.0, 30.0]])
-"""Two turns of the outer axis in the whole test, a sixth of one of the inner (rad)."""
-
-
 @pytest.fixture(scope="session")
 def recording() -> Recording:
-    """With 40 ug/g^2, thirty times what this plan sees at one sigma in stops of a minute."""
-    # The tests of the table run where the simulated IMU is not installed.
-    from sdimu_sim.core.scenario import Scenario, generate
+    """Of the quick plan, with a hidden effect."""
+    # The tests of the table run where simulated IMU and studies are not installed.
+    from plans import hidden_recording, quick_plan
 
-    plan = load_plan("kim18")
-    scenario = Scenario(
-        replace(plan, dwell_s=(60.0,) * len(plan.dwell_s)),
-        load_imu("dtg"),
-        load_site("daejeon"),
-        TableSpecification(axes=None),
-        rate_hz=20.0,
-        seed=SEED,
-        effects=(f"{HIDDEN}=40 ug/g^2",),
-    )
-    return generate(scenario)[0]
+    return hidden_recording(quick_plan())
 
 
 @pytest.fixture(scope="session")
@@ -200,6 +183,6 @@ def diagnosis(recording: Recording) -> Diagnosis:
 
 @pytest.fixture(scope="session")
 def more(recording: Recording, diagnosis: Diagnosis) -> ReportExtras:
-    """With the table's angles, as a bag has them."""
-    table = TableLog(np.array([0.0, recording.t[-1]]), ("outer", "inner"), ANGLES)
-    return replace(report_extras(diagnosis), table=table)
+    from plans import with_angles
+
+    return with_angles(diagnosis, recording)

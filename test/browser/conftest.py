@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import select
 import shutil
 import socket
@@ -11,14 +10,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+from plans import HIDDEN, SEED, quick_plan
 
-from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.plan_file import write_plan
 
 START_S = 300.0  # a first run on a new machine compiles
@@ -32,22 +30,13 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
-HIDDEN = "accel_quadratic_x"
-SEED = 5
 SIZE = "40 ug/g^2"  # twenty-five times what the quick plan sees at one sigma
-DWELL_S, RATE_RAD_S = 40.0, math.radians(9.0)
-"""The attitudes of the default plan in a third of its time: no claim about the page hangs on how long a stop is."""
+DWELL_S = 40.0
+"""Duration of a stop (s)."""
 
 
 def sdimu(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)]
-
-
-def quick_plan() -> Plan:
-    """Plan the attitudes of the default plan with short stops and quick turns."""
-    plan = load_plan("kim18")
-    turns = tuple(replace(turn, rate_rad_s=RATE_RAD_S) for turn in plan.turns)
-    return Plan("quick", (DWELL_S,) * len(plan.dwell_s), turns, RATE_RAD_S)
 
 
 @dataclass
@@ -76,7 +65,7 @@ def workbench(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     """A recording with a hidden effect, and a broken one beside it."""
     folder = tmp_path_factory.mktemp("recordings")
     bag, plan = folder / "hidden", tmp_path_factory.mktemp("plan") / "quick.yaml"
-    write_plan(plan, quick_plan())
+    write_plan(plan, quick_plan(dwell_s=DWELL_S))
     given = ("--plan", plan, "--rate", 20, "--seed", SEED, "--effect", f"{HIDDEN}={SIZE}")
     making = sdimu("simulate", *given, "--out", bag)
     subprocess.run(making, check=True, capture_output=True, timeout=START_S)

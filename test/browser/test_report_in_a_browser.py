@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from plans import hidden_recording, with_angles
 
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.diagnosis.summary import summarise
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.report.page import write_report
-from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 
 from .conftest import broken_rules
 
@@ -21,9 +24,21 @@ OPEN_S = 1.5
 
 
 @pytest.fixture(scope="module")
-def report(diagnosis: Diagnosis, more: ReportExtras, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recording() -> Recording:
+    """Of the default plan in stops of a minute: how much a first screen has to say hangs on the recording."""
+    plan = load_plan("kim18")
+    return hidden_recording(replace(plan, dwell_s=(60.0,) * len(plan.dwell_s)))
+
+
+@pytest.fixture(scope="module")
+def diagnosis(recording: Recording) -> Diagnosis:
+    return diagnose(recording, load_site("daejeon"), load_imu("dtg"), load_model("baseline"))
+
+
+@pytest.fixture(scope="module")
+def report(diagnosis: Diagnosis, recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    write_report(path, diagnosis.after, summary=summarise(diagnosis), more=more)
+    write_report(path, diagnosis.after, summary=summarise(diagnosis), more=with_angles(diagnosis, recording))
     return path
 
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from plans import HIDDEN
 
 from .bench_page import add_first, choose, click_cell, drawn, held_out, text
-from .conftest import DWELL_S, HIDDEN, click_bar, settle
+from .conftest import DWELL_S, click_bar, settle
 
 
 def test_a_click_on_a_cell_shows_that_stop_and_channel(visit: Callable[[], Any]) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from plans import quick_plan
 
 import sdimu_calibration as sdimu
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.plan_file import write_plan
 from sdimu_calibration.storage.files.result_file import read_result
 
@@ -19,9 +18,8 @@ HIDDEN = "accel_quadratic_x"
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory) -> Path:
-    """Of the plan kim18 in stops of a minute."""
-    folder, plan = tmp_path_factory.mktemp("api"), load_plan("kim18")
-    write_plan(folder / "plan.yaml", replace(plan, dwell_s=(60.0,) * len(plan.dwell_s)), [])
+    folder = tmp_path_factory.mktemp("api")
+    write_plan(folder / "plan.yaml", quick_plan(), [])
     return sdimu.simulate(
         folder / "bag", plan=str(folder / "plan.yaml"), rate=20.0, seed=5, effect=[f"{HIDDEN}=40 ug/g^2"]
     )
@@ -91,7 +89,7 @@ def test_an_opened_test_says_what_it_is_of(bag):
     text = repr(test)
     assert len(text) < 400
     assert f"samples: {len(test.recording.t)} at 20 Hz" in text
-    for word in ("recording: bag", "duration: 2220.0 s (37.0 min)", "stops: 19", "IMU: dtg", "site: daejeon"):
+    for word in ("recording: bag", "duration: 1000.0 s (16.7 min)", "stops: 19", "IMU: dtg", "site: daejeon"):
         assert word in text
     assert all(line.partition(": ")[2] in test._repr_html_() for line in text.splitlines())
     assert "stops: 19, without 3, 7" in repr(test.without_stops((3, 7)))

@@ -6,16 +6,16 @@ import json
 import re
 import socket
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from plans import quick_plan
 
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.catalogue import page
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
-from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
 OWN = """\
@@ -45,9 +45,13 @@ def sdimu(monkeypatch, capsys):
 @pytest.fixture(scope="module")
 def hidden(tmp_path_factory):
     """Bag of a short test with a quadratic term of the y accelerometer hidden in it."""
-    plan = replace(load_plan("kim18"), dwell_s=(30.0,) * 19)
     scenario = Scenario(
-        plan, load_imu("dtg"), load_site("daejeon"), rate_hz=20.0, seed=401, effects=("accel_quadratic_y=200 ug/g^2",)
+        quick_plan(),
+        load_imu("dtg"),
+        load_site("daejeon"),
+        rate_hz=20.0,
+        seed=401,
+        effects=("accel_quadratic_y=200 ug/g^2",),
     )
     recording, _ = generate(scenario)
     path = tmp_path_factory.mktemp("bags") / "hidden"

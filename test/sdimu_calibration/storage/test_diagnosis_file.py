@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plans import quick_plan
 
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.diagnosis_file import content, read_diagnosis, unpacked, write_diagnosis
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -21,10 +22,9 @@ SITE = Site(latitude_rad=float(np.radians(36.4)))
 
 @pytest.fixture(scope="module")
 def told():
-    plan = replace(load_plan("kim18"), dwell_s=(40.0,) * 19)
     imu = load_imu("dtg")
     hidden = ("accel_quadratic_x=150 ug/g^2",)
-    recording, _ = generate(Scenario(plan, imu, SITE, rate_hz=20.0, seed=301, effects=hidden))
+    recording, _ = generate(Scenario(quick_plan(), imu, SITE, rate_hz=20.0, seed=301, effects=hidden))
     return summarise(diagnose(recording, SITE, imu, load_model("baseline")))
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import pytest
+from plans import quick_plan
 
 from sdimu_calibration.core.compensation import compensate_recording, compensator
 from sdimu_calibration.core.diagnosis.diagnose import climb, diagnose
@@ -25,7 +26,7 @@ from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.export import FORMS, export
-from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
+from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis, write_diagnosis
 from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_calibration.storage.files.result_file import read_result, write_result
@@ -57,8 +58,7 @@ TABLE_IMUS = ("dtg", "rlg_navigation", "fog_tactical", "mems_industrial", "mems_
 
 
 def scenario(imu, dwell_s=40.0):
-    plan = load_plan("kim18_signed")
-    return Scenario(replace(plan, dwell_s=(dwell_s,) * len(plan.dwell_s)), load_imu(imu), SITE, rate_hz=20.0, seed=71)
+    return Scenario(quick_plan("kim18_signed", dwell_s), load_imu(imu), SITE, rate_hz=20.0, seed=71)
 
 
 @cache

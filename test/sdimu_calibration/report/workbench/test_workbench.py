@@ -135,7 +135,7 @@ def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tm
     assert "nothing stands out" in after["verdict"]["children"]
     rungs = after["ladder"]["figure"]["data"][0]["x"]
     assert rungs[1] < rungs[0]
-    # A right model predicts left-out stops to one sigma; 7,000 numbers scatter by 0.9 %.
+    # A right model predicts left-out stops to one sigma; 4,400 numbers scatter by 1.1 %.
     assert rungs[1] == pytest.approx(1.0, abs=0.03)
 
     packed = page.post("file.data", "export.n_clicks")["file"]["data"]["content"]
@@ -380,7 +380,8 @@ def test_residuals_are_drawn_against_what_is_chosen(app, bench):
     for against in axes:
         drawn = page.drawn(shown, against_at_value=against, which_at_value="all")["residuals"]["figure"]
         assert drawn["layout"]["xaxis"]["title"]["text"] == against
-        assert len(drawn["data"][0]["customdata"]) > 1000
+        # More than ten of the nineteen stops have.
+        assert len(drawn["data"][0]["customdata"]) > 10 * 40
     assert {"roll (deg)", "specific force z (g)", "rate x (deg/h)", "turn before, x (deg/s)"} <= set(axes)
 
 
