@@ -68,8 +68,7 @@ test-run: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
 
 # The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
-# Nodes wait for each other more than they work: they run beside what keeps both cores busy. A third worker of the rest
-# works where another one waits for a browser.
+# Nodes wait for each other more than they work: they run beside what keeps both cores busy.
 thorough: setup
 	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest
 
@@ -80,7 +79,7 @@ thorough-nodes: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book
 
 thorough-rest: setup
-	$(BIN)/python -m pytest -n 3 --dist loadfile -m "thorough and not ros and not slow and not bench"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
 # What linear algebra decides, with other kernels of OpenBLAS (without AVX) than in `test` and `thorough`: no test stands on
 # the last digits of a library.
