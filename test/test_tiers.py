@@ -50,7 +50,7 @@ def test_what_make_test_leaves_out_is_run_by_ci_and_decides_there():
     assert '-m "not thorough and not slow and not bench"' in make
     assert '-m "thorough and ros and not slow and not bench"' in make
     assert '-m "thorough and not ros and not slow and not bench"' in make
-    beside = "make -j 5 --output-sync=target thorough-nodes thorough-rest colcon docs other-blas"
+    beside = "make -j 3 --output-sync=target thorough-nodes thorough-rest colcon docs other-blas"
     for line in ("make test", beside):
         # Alone on its line: nothing takes its failure away.
         assert f"\n{line}\n" in ci
