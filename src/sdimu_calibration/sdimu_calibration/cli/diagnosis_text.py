@@ -129,7 +129,7 @@ def _candidates(console: Console, summary: DiagnosisSummary) -> None:
     print_table(console, CANDIDATE_HEADINGS, lines, title)
     for f in shown:
         alike = f"looks here like {', '.join(f.alike[:4])}" if f.alike and len(f.may_be) < 2 else ""
-        pairs = [f"{one} with {other} ({in_percent(p)})" for one, other, p in f.together[:_TOP]]
+        pairs = [f"{one} with {other} ({in_percent(p)})" for one, other, p in f.together[:_TOP] if p >= NAMED]
         same = f"the same by two effects together: {', '.join(pairs)}" if pairs else ""
         fall = _fall(f) if len(shown) > 1 else ""
         words = "; ".join(part for part in (fall, alike, same) if part)

@@ -202,7 +202,9 @@ def _tell(console: Console, asked: _Begun, coefficients: Sequence[str], allowed:
     with bar(console) as progress:
         ranked = next_turn(onto, asked.question, coefficients, rates_rad_s=speeds, progress=progress)
     none = untold(ranked, coefficients)
-    for text in [none] if none else [one.text for one in ranked[:5]]:
+    where = "Turns of the next recording" if asked.before else f"Turns after those of {asked.start.name}"
+    heading = f"{where} that tell {' from '.join(coefficients)}, the most a minute first:"
+    for text in [none] if none else [heading, *(one.text for one in ranked[:5])]:
         say(console, text)
     answer(_ranking(asked.start, coefficients, ranked) | ({"none": none} if none else {}), as_json)
 

@@ -132,8 +132,8 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
             spell=partial(spelled, asked=about),
         )
     printed(folder / "report.html")
-    _show(console, after, diagnosed=True)
     say(console, f"{found.verdict}: {found.sentence}")
+    _show(console, after, diagnosed=True)
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.request.as_json)

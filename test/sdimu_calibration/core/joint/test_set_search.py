@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -98,6 +100,11 @@ def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
     found = diagnose_set(two.members, options, here)
     assert found.verdict == "class of effects"
     assert set(found.standing.open[0]) >= {"gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"}
+    shares = {share.name: share.probability for share in found.findings[0].may_be}
+    assert set(shares) >= {"gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"}
+    open_which = [name for name, p in shares.items() if p >= NAMED]
+    assert all(f"{in_percent(shares[name])}" in found.sentence for name in open_which)
+    assert ("open which" in found.sentence) == (len(open_which) > 1)
     line = next(a for a in map(sentence, found.advice) if "gyro_scale_quadratic_y" in a)
     assert "turn Y +90 deg at 10 deg/s" in line
     advised = Plan("advised", (100.0,) * 2, (Turn("Y", 0.5 * math.pi, math.radians(10.0)),), math.radians(20.0))

@@ -10,6 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.probability import in_percent
@@ -159,6 +160,9 @@ def name_of(one: Found) -> str:
 
 def named(coefficient: str) -> str:
     """Name a coefficient in words, its axis behind the effect; one that no catalogue knows by itself."""
+    coefficient, _, recording = coefficient.partition(OF_RECORDING)
+    if recording:
+        return f"{named(coefficient)} in {recording} alone"
     try:
         effect = resolve(coefficient)
     except DataError:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import Graded, in_grades, named, other_coefficients, size
+from sdimu_calibration.core.diagnosis.grades import NAMED, Graded, in_grades, named, other_coefficients, size
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
@@ -29,7 +29,7 @@ from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_o
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
-from sdimu_calibration.core.posterior.told import Probabilities, probabilities
+from sdimu_calibration.core.posterior.told import Probabilities, Share, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
 from sdimu_calibration.core.progress import Progress, silent
@@ -64,6 +64,8 @@ class SetFinding:
         What the set cannot tell from it.
     probability : float
         That it or one of these is in all recordings, or in this one.
+    may_be : tuple of Share
+        Coefficients of that class with the probability of each, the likeliest first.
     against : str
         The other one of two recordings, where a coefficient is not the same in both: no data tell which of them
         changed. Empty for all else.
@@ -79,6 +81,7 @@ class SetFinding:
     display_unit: str
     alike: tuple[str, ...]
     probability: float = float("nan")
+    may_be: tuple[Share, ...] = ()
     against: str = ""
 
     @property
@@ -246,7 +249,8 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     return tuple(
         SetFinding(
             *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
-            *(tuple(alike), probability, _against(label, recording, recordings)),
+            *(tuple(alike), probability, found.may_be.get(tagged(label, recording) if recording else label, ())),
+            _against(label, recording, recordings),
         )
         for label, title, recording, k, z, p, alike, probability in (*shared, *own)
     )
@@ -339,8 +343,10 @@ def _found(
 
 
 def _graded(f: SetFinding) -> Graded:
-    same = f", or what looks the same in these recordings ({', '.join(f.alike[:_LISTED])})" if f.alike else ""
-    return Graded(f"{_named(f)}{same}", f.label, "", f.probability)
+    # What is of one recording is told with what else it may be by its advice.
+    shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
+    coefficient = f.label.partition("(")[0]
+    return Graded(_named(f), coefficient, size(f.value, f.sigma, f.display_unit), f.probability, shares)
 
 
 def _named(f: SetFinding) -> str:

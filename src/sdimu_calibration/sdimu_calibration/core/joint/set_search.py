@@ -30,7 +30,7 @@ from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
 from sdimu_calibration.core.posterior.posterior import Posterior
-from sdimu_calibration.core.posterior.told import of_coefficients
+from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
 
 _MOST_ROUNDS = 12
@@ -85,6 +85,8 @@ class SetSearch:
         By label, what the set cannot tell from it.
     probability : mapping
         By label, that it or one of these is in all recordings (1).
+    may_be : mapping
+        By label, coefficients of its class with the probability of each; of what is of one recording, too.
     threshold : float
         Score that noise reaches in a scan of the joint evidence.
     first : Search
@@ -101,6 +103,7 @@ class SetSearch:
     z: tuple[float, ...]
     alike: dict[str, tuple[str, ...]]
     probability: dict[str, float]
+    may_be: dict[str, tuple[Share, ...]]
     local: tuple[LocalFind, ...]
     threshold: float
     first: Search[SetEvidence]
@@ -192,6 +195,7 @@ def _result(
         tuple(z.get(label, float("nan")) for label in shared),
         alike,
         {label: classes[label][1] for label in shared},
+        {label: one[2] for label, one in classes.items()},
         local,
         first.threshold,
         first,
@@ -348,14 +352,15 @@ def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Seque
     return [v for v in variants if have.isdisjoint(v.labels)]
 
 
-def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], float]:
-    """Say what the set cannot tell from a candidate, and the probability that it or any of them is there."""
+def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], float, tuple[Share, ...]]:
+    """Say what the set cannot tell from a candidate, how probable any of them is, and each coefficient of them."""
     for place, (number, _) in enumerate(found.told.members):
         together = [found.candidate(k) for k in (number, *found.classes[place])]
         own = next((c for c in together if c.label == label), None)
         if own is not None:
-            return tuple(c.label for c in together if c.coefficient != own.coefficient), found.of_class(place)
-    return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0)
+            others = tuple(c.label for c in together if c.coefficient != own.coefficient)
+            return others, found.of_class(place), may_be(found, place)
+    return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0), ()
 
 
 def place_of_local(names: Sequence[str], find: LocalFind) -> int:

@@ -25,7 +25,7 @@ from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.fleet.common import STEPS, Bytes
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
-from sdimu_calibration.core.posterior.told import Probabilities
+from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -245,7 +245,7 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         "label": f.candidate.label,
         "parameters": [entry(f, f"name={of}.name value sigma unit={of}.unit display_unit={of}.display_unit")],
         "probability": f.probability,
-        "may_be": [entry(share, "name p=probability") for share in f.may_be],
+        "may_be": _shares(f.may_be),
         "same_together": [{"labels": [one, other], "p": p} for one, other, p in f.together],
         **entry(f, "z delta_log_likelihood=log_likelihood_gain log_bayes_factor p_value_adjusted explained"),
         **entry(f, "held_out_rms_before=held_out_before held_out_rms_after=held_out_after"),
@@ -285,6 +285,10 @@ def step_of(s: Step) -> dict[str, Any]:
 
 def _moved(s: Step | Rung) -> list[dict[str, Any]]:
     return [{"name": name, "sigmas": size} for name, size in s.moved]
+
+
+def _shares(shares: Sequence[Share]) -> list[dict[str, Any]]:
+    return [entry(share, "name p=probability") for share in shares]
 
 
 def _null(null: Null) -> dict[str, Any]:
@@ -337,7 +341,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         sentence=found.sentence,
         threshold=found.threshold,
         probabilities=odds(found.probabilities),
-        findings=[asdict(f) | {"alike": list(f.alike)} for f in found.findings],
+        findings=[asdict(f) | {"alike": list(f.alike), "may_be": _shares(f.may_be)} for f in found.findings],
         refused=[f.label for f in found.refused],
         held_out_before=found.error_without,
         held_out_after=found.after.fit["held_out_rms"],
