@@ -343,7 +343,7 @@ def _found(
 
 
 def _graded(f: SetFinding) -> Graded:
-    # What is of one recording is told with what else it may be by its advice.
+    # Of what is of one recording alone the class is not told: what happened there is to be found out.
     shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
     coefficient = f.label.partition("(")[0]
     return Graded(_named(f), coefficient, size(f.value, f.sigma, f.display_unit), f.probability, shares)
