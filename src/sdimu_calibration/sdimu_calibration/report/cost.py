@@ -50,7 +50,17 @@ class Off:
     @property
     def size(self) -> str:
         """The amount with its sigma and unit: ``+26.2 +- 4.8 ppm``."""
-        return f"{self.amount:+.{decimals(self.sigma)}f} +- {self.sigma:.{decimals(self.sigma)}f} {self.unit}"
+        return f"{self.alone} +- {self.known} {self.unit}"
+
+    @property
+    def alone(self) -> str:
+        """The amount without unit: ``+26.2``."""
+        return f"{self.amount:+.{decimals(self.sigma)}f}"
+
+    @property
+    def known(self) -> str:
+        """Its sigma without unit: ``4.8``."""
+        return f"{self.sigma:.{decimals(self.sigma)}f}"
 
 
 def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]:

@@ -155,8 +155,9 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
 
 def _off(one: Off) -> tuple[str, str]:
     """Say by how much a coefficient is wrong."""
-    amount = one.size.replace("-", "\N{MINUS SIGN}")
-    return amount, f"<code>{escape(one.name)}</code> is off without it: {abs(one.sigmas):.1f} of its sigmas"
+    amount = f"{one.alone} {one.unit}".replace("-", "\N{MINUS SIGN}")
+    known = f"(\N{PLUS-MINUS SIGN}{one.known})"
+    return amount, f"<code>{escape(one.name)}</code> off {known}: {abs(one.sigmas):.1f} of its sigmas"
 
 
 def _in_noise(error: float) -> tuple[str, str]:

@@ -137,4 +137,4 @@ def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, ver
     assert first.tone == tone
     assert first.tag != "The model is wrong" or tone == "bad"
     assert first.advice == (f"Use the coefficients of this page{', which hold what was found' if findings else ''}.",)
-    assert any("is off without it" in words for _, words in first.costs) == bool(findings)
+    assert any("</code> off (" in words for _, words in first.costs) == bool(findings)
