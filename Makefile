@@ -132,9 +132,10 @@ mutations: setup
 mutants: setup
 	$(BIN)/python test/mutants.py
 
-# The book, out/docs/index.html: it is read without a network. Every warning is an error.
+# What the book needs to be made.
 docs-setup: $(BOOK)
 
+# The book, out/docs/index.html: it is read without a network. Every warning is an error.
 docs: $(BOOK)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 

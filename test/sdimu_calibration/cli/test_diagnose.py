@@ -89,7 +89,11 @@ def test_the_loop_of_diagnosis_addition_and_comparison(sdimu, hidden, tmp_path):
     assert status == 3
     assert "not to be trusted: the model" in err
     assert "does not fit" in err
-    assert sdimu("calibrate", hidden, "--add", label, "--out", tmp_path / "more")[0] == 0
+    assert "To learn what the model misses:\n  sdimu diagnose " in out
+    status, out, _ = sdimu("calibrate", hidden, "--add", label, "--out", tmp_path / "more")
+    assert status == 0
+    looked_for = out.replace("\n", " ").partition("Nobody has looked for small effects that the model lacks")[2]
+    assert f"To look:   sdimu diagnose {hidden} --add {label}" in looked_for
     fits = [json.loads((tmp_path / n / "result.json").read_text())["fit"] for n in ("base", "more")]
     assert fits[1]["held_out_rms"] < fits[0]["held_out_rms"]
     assert fits[1]["log_likelihood"] > fits[0]["log_likelihood"]

@@ -8,7 +8,7 @@ from sdimu_calibration.loading import ending_at_once
 
 _SELDOM = (50_000, 20, 50)
 """Number of new objects between searches for garbage, and of searches among older ones: while a thousand modules load
-nothing is garbage, and Python's own (700, 10, 10) spend a tenth of a run on it."""
+nothing is garbage, and Python's own (700, 10, 10) spend 5 to 10 % of a calibration on it."""
 
 
 def sdimu() -> None:

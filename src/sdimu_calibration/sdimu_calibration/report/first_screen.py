@@ -29,7 +29,7 @@ from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.markup import grid, prose, quiet
 from sdimu_calibration.report.report_extras import ReportExtras
 
-if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"

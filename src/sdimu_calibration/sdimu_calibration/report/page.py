@@ -34,7 +34,7 @@ from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.trace import Trace
 
-if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
 

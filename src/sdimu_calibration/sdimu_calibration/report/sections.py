@@ -11,6 +11,7 @@ from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -235,6 +236,7 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         pairs = "; ".join(
             f"<code>{escape(first)}</code> with <code>{escape(second)}</code> together {in_percent(p)}"
             for first, second, p in one.together[:3]
+            if p >= NAMED
         )
         others = "; ".join(part for part in (others, pairs) if part)
         stake = "; ".join(

@@ -15,7 +15,7 @@ from sdimu_calibration.report.groups import is_free
 from sdimu_calibration.report.markup import Draw, grid, quiet, section
 from sdimu_calibration.report.table import with_sigma
 
-if TYPE_CHECKING:  # a result of one recording has none, and to load it takes as long as a filter pass
+if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.recurrence import Recurrence
 
 _TRENDS = 8

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import _at_stake, add, others, telling_turn, together
+from sdimu_calibration.core.diagnosis.advice import _at_stake, _in_sight, add, others, telling_turn, together
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.grades import other_coefficients
@@ -110,6 +110,9 @@ def test_coefficients_at_stake_are_those_of_members_that_are_named():
     shares = (Share("gyro_scale_asymmetry_z", 0.7), Share("gyro_scale_quadratic_z", 0.29), Share("accel_play_x", 0.005))
     one = replace(found(candidate), coefficient_shifts=shifts, may_be=shares)
     assert _at_stake(one).arguments == ("gyro_scale_asymmetry_z", (("gyro_scale_quadratic_z", "gyro_scale_z", 5.0),))
+    equation = CoefficientShift("accel_x: sin(3 fx)", "accel_bias_x", 7.0)
+    odd = replace(one, coefficient_shifts=(equation,), may_be=(*shares, Share("accel_x: sin(3 fx)", 0.2)))
+    assert _in_sight(odd) == [equation]
 
 
 @pytest.mark.parametrize(("oblique", "kind"), [(0, Kind.REST_ON_DIAGONAL), (8, Kind.REPEAT_TURN)])

@@ -10,6 +10,11 @@ import pytest
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
+from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.joint.set_diagnosis import SetFinding
+from sdimu_calibration.core.joint.set_diagnosis import _verdict as verdict_of_set
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
@@ -54,8 +59,32 @@ def test_shares_beyond_all_are_said_to_be_of_two_that_may_be_there(summary):
 
 
 def test_an_equation_that_fits_is_not_called_certain_physics(summary):
-    (one,) = graded(with_shares(summary, 0.999, (own(summary), 0.999)).candidates, None)
-    assert in_grades([one], "Missing for certain, and fitted by").startswith("Missing for certain, and fitted by: acc")
+    told = with_shares(summary, 0.999, (own(summary), 0.999))
+    d = replace(told.diagnosis, own=True, verdict=Verdict.OWN_EQUATION)
+    begun = "No effect of the catalogue fits, an equation does. Missing for certain, and fitted by: accelerometer"
+    assert sentence(d, told.found).startswith(begun)
+    assert sentence(replace(d, own=False, verdict=Verdict.ONE_EFFECT), told.found).startswith("Certain: accelerometer")
+
+
+@pytest.mark.parametrize(
+    ("alike", "word"),
+    [
+        ((), Verdict.ONE_EFFECT),
+        (("gyro_bias_warm_up_x(tau=1200 s)",), Verdict.ONE_EFFECT),
+        (("gyro_bias_warm_up_x(tau=1200 s)", "gyro_bias_ramp_x"), Verdict.CLASS_OF_EFFECTS),
+    ],
+)
+def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike, word):
+    (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
+    found = summary.diagnosis.found
+    assert verdict(Facts(found, (candidate,), alike, (), (), own=False, unexplained=False)) == word
+    of_set = SetFinding(candidate.label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
+    assert verdict_of_set([of_set], after, SimpleNamespace(), None) == word
+
+
+def test_a_coefficient_of_one_recording_is_named_with_it():
+    assert named("gyro_bias_x@r2") == f"{named('gyro_bias_x')} in r2 alone"
 
 
 def test_what_is_likely_says_how_likely(summary):

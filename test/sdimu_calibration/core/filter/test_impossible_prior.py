@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from sdimu_calibration.core.estimation.solve import extend, solve
+from sdimu_calibration.core.filter import passes
 from sdimu_calibration.core.filter.impossible_prior import impossible_prior, possible
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_model
 from sdimu_calibration.storage.files.effect_file import find_effects, load_effect
@@ -67,6 +68,14 @@ def test_a_motion_that_an_earlier_pass_made_of_it_blames_no_prior(bench):
     motion = bench.fit().bare.seen
     assert possible(motion)
     assert not possible(replace(motion, f=motion.f * 1e9))
+
+
+def test_what_an_earlier_pass_made_of_the_motion_is_no_matter_of_the_prior(bench, monkeypatch):
+    test = bench.fit().test
+    wide = replace(test.imu, prior={**test.imu.prior, "gyro_bias": to_si(1e10, "deg/h")}, file="mine.yaml")
+    monkeypatch.setattr(passes, "possible", lambda _: False)
+    with pytest.raises(DivergedError, match="add to the model what is far larger than its priors"):
+        solve(replace(test, imu=wide), load_model("baseline"))
 
 
 def test_a_wide_prior_that_the_filter_bears_is_not_refused(bench):

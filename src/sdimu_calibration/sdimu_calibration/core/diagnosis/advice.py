@@ -13,7 +13,7 @@ from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
-from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coefficients
+from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coefficients, without_variant
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
@@ -123,10 +123,11 @@ def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
 
 def add(found: Sequence[Found], told: Probabilities | None = None) -> list[Advice]:
     """Advise how what was found gets into the model: what is decided to stay, what is open to be tried."""
-    settled = [one.decided and not grade.is_open for one, grade in zip(found, graded(found, told), strict=True)]
-    decided, doubtful = (
-        [one for one, is_sure in zip(found, settled, strict=True) if is_sure == sure] for sure in (True, False)
-    )
+    decided: list[Found] = []
+    doubtful: list[Found] = []
+    for one, grade in zip(found, graded(found, told), strict=True):
+        settled = one.decided and not grade.is_open
+        (decided if settled else doubtful).append(one)
     out = [_adding(Kind.KEEP, decided, decided)] if decided else []
     return [*out, _adding(Kind.TRY, doubtful, found)] if doubtful else out
 
@@ -172,7 +173,7 @@ def _at_stake(one: Found) -> Advice:
 def _in_sight(one: Found) -> list[CoefficientShift]:
     """Coefficients that move with members of the class that are named beside it: others are too improbable."""
     named = {share.name for share in one.may_be if share.probability >= NAMED}
-    return [s for s in one.coefficient_shifts if not one.may_be or s.other.partition("(")[0] in named]
+    return [s for s in one.coefficient_shifts if not one.may_be or without_variant(s.other) in named]
 
 
 def telling_turn(effect: Effect, plan: PlanSeen) -> Advice:
@@ -232,7 +233,7 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...
         Advice(Kind.CHOICE_MATTERS_HANDHELD, (one.candidate.label, s.other, s.coefficient, s.sigmas))
         for one in found
         if others(one)
-        for s in one.coefficient_shifts[:3]
+        for s in _in_sight(one)[:3]
     ]
     if d.verdict == Verdict.UNEXPLAINED:
         out.append(Advice(Kind.RECORD_IN_OTHER_ORDER))

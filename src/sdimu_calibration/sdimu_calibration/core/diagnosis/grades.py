@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.posterior.family import family_of
@@ -21,15 +21,10 @@ CERTAIN = 0.99
 """Probability (1) from which an effect is called certain: one in a hundred is wrong then."""
 NAMED = 0.05
 """Probability (1) from which something that may be there instead is named: one in twenty."""
-_VARIANT = re.compile(r"\([^)]*\)")
-"""Variant of an effect in its label (text): time constants and other numbers in brackets."""
 LISTED = 4
 """Number of effects, or of those that may be one, that a sentence lists: more do not fit into one."""
-
-
 _MORE_THAN_ONE = 1.005
 """Sum of probabilities (1) that shows as more than 100 %: models that hold two of the effects count for both."""
-_TWO = "two of them may be there"
 
 
 @dataclass(frozen=True)
@@ -106,7 +101,7 @@ def _grade(one: Found, told: Probabilities | None, named: Collection[str]) -> tu
     family = next((f for f in told.families if (f.family, f.sensor) == of_family), None)
     members: dict[str, float] = {}
     for member in family.members if family else ():
-        name = member.label.partition("(")[0]
+        name = without_variant(member.label)
         members[name] = members.get(name, 0.0) + member.probability
     known = {share.name: share.probability for share in one.may_be}
     # Models may hold two time constants of one effect: where the class knows it, the sum counts them once.
@@ -125,7 +120,7 @@ def _open(one: Graded) -> str:
     sizes = {one.coefficient: f" ({one.size})"}
     shown = one.may_be[:LISTED]
     told = [f"{named(s.name)}{sizes.get(s.name, '')} {in_percent(s.probability)}" for s in shown]
-    both = f"; {_TWO}" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
+    both = "; two of them may be there" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
     return f"{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
 
 
@@ -174,13 +169,14 @@ def named(coefficient: str) -> str:
 
 def other_coefficients(label: str, alike: Iterable[str]) -> tuple[str, ...]:
     """Labels of another coefficient, or of the same one in another recording: no other time constant of its own."""
-    own = _without_variant(label)
-    return tuple(other for other in alike if _without_variant(other) != own)
+    own = without_variant(label)
+    return tuple(other for other in alike if without_variant(other) != own)
 
 
-def _without_variant(label: str) -> str:
-    """Return a label without the numbers of its variant; an equation, which has brackets of its own, as it is."""
-    return label if ":" in label else _VARIANT.sub("", label)
+def without_variant(label: str) -> str:
+    """Return a label without its time constant; an equation, whose brackets belong to its formula, as it is."""
+    key, at, recording = label.partition(OF_RECORDING)
+    return f"{parse_key(key).name}{at}{recording}"
 
 
 def _with_axis(title: str, axis: str, variant: str) -> str:

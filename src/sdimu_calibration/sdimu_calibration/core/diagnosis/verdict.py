@@ -33,8 +33,6 @@ _COLOURED = 1.2
 minutes."""
 _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
-
-
 _EQUATION = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 

@@ -9,7 +9,15 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import NAMED, Graded, in_grades, named, other_coefficients, size
+from sdimu_calibration.core.diagnosis.grades import (
+    NAMED,
+    Graded,
+    in_grades,
+    named,
+    other_coefficients,
+    size,
+    without_variant,
+)
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
@@ -345,8 +353,7 @@ def _found(
 def _graded(f: SetFinding) -> Graded:
     # Of what is of one recording alone the class is not told: what happened there is to be found out.
     shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
-    coefficient = f.label.partition("(")[0]
-    return Graded(_named(f), coefficient, size(f.value, f.sigma, f.display_unit), f.probability, shares)
+    return Graded(_named(f), without_variant(f.label), size(f.value, f.sigma, f.display_unit), f.probability, shares)
 
 
 def _named(f: SetFinding) -> str:

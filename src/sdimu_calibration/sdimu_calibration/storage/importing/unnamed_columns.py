@@ -95,15 +95,21 @@ def _explained(x: Floats, y: Floats) -> float:
     return 1.0 - float(np.sum(left**2)) / total if total > 0.0 else 1.0
 
 
+def _fits(
+    numbers: Floats, rate_hz: float, pairs: Sequence[tuple[Three, Three]], any_sense: bool
+) -> dict[tuple[Three, Three], tuple[bool, float]]:
+    """Of the pairs that turn together whether the force is none of gravity's size, and what the turns leave (1)."""
+    fits = {}
+    for force, rate in pairs:
+        fit = fit_of_turns(numbers[:, list(rate)], numbers[:, list(force)], rate_hz, any_sense=any_sense)
+        if fit.factor is not None:
+            fits[force, rate] = (not is_gravity(median_size(numbers[:, list(force)])), fit.left)
+    return fits
+
+
 def _by_turns(numbers: Floats, rate_hz: float, pairs: Sequence[tuple[Three, Three]]) -> list[Pair]:
     """Choose the force and the rates that turn together, by preference as they stand; none where no turn tells."""
-    fits: dict[tuple[Three, Three], tuple[bool, float]] = {}
-    for any_sense in (False, True):
-        for force, rate in () if fits else pairs:
-            fit = fit_of_turns(numbers[:, list(rate)], numbers[:, list(force)], rate_hz, any_sense=any_sense)
-            if fit.factor is not None:
-                of_gravity = is_gravity(median_size(numbers[:, list(force)]))
-                fits[force, rate] = (not of_gravity, fit.left)
+    fits = _fits(numbers, rate_hz, pairs, False) or _fits(numbers, rate_hz, pairs, True)
     if not fits:
         return []
     best = min(fits, key=lambda pair: fits[pair])
