@@ -73,7 +73,11 @@ thorough: setup
 	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest
 
 thorough-nodes thorough-rest: export OPENBLAS_CORETYPE = Haswell
-thorough-nodes: export SDIMU_FIRST_DOMAIN = 70
+# Targets that run side by side, each in ROS domains of its own; a run that looks for a free domain takes none of these.
+thorough-rest: export SDIMU_FIRST_DOMAIN = 215
+thorough-nodes: export SDIMU_FIRST_DOMAIN = 219
+other-blas: export SDIMU_FIRST_DOMAIN = 223
+colcon: export SDIMU_FIRST_DOMAIN = 227
 # Two folders hold all of them: to import the others would take each worker 5 s.
 thorough-nodes: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book
@@ -106,7 +110,7 @@ colcon: setup
 	    --pytest-args -q -m "not slow and not bench and not ros" && \
 	printf '%s\n' 'format: sdimu-plan/1' 'dwell: 8 s' 'rate: 30 deg/s' 'acceleration: 60 deg/s^2' \
 	    'turns: [{axis: Y, angle: 90 deg}]' > $$work/plan.yaml && cp test/ros/launch_stub.py $$work && cd / && \
-	NUMBA_DISABLE_JIT=1 ROS_DOMAIN_ID=97 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$$work/log $(CURDIR)/$(BIN)/python \
+	NUMBA_DISABLE_JIT=1 ROS_DOMAIN_ID=231 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$$work/log $(CURDIR)/$(BIN)/python \
 	    $$work/launch_stub.py $$work/install sdimu_sim simulation_launch.py plan:=$$work/plan.yaml out:=$$work/run \
 	    drive:=plan allow_motion:=true && test -s $$work/run/result.json
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,8 @@ import pytest
 from mutants import CORE, MUTANTS
 from sharing import APART, LONGEST, TOGETHER, scope_of
 from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
+
+from sdimu_calibration.cli.processes import DOMAINS, STATED
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -54,6 +57,20 @@ def test_what_make_test_leaves_out_is_run_by_ci_and_decides_there():
     for line in ("make test", beside):
         # Alone on its line: nothing takes its failure away.
         assert f"\n{line}\n" in ci
+
+
+def test_targets_that_run_side_by_side_share_no_ros_domain():
+    ci, make = ((ROOT / name).read_text() for name in (".ci/run", "Makefile"))
+    first = {
+        name: int(number) for name, number in re.findall(r"^(\S+): export SDIMU_FIRST_DOMAIN = (\d+)$", make, re.M)
+    }
+    beside = {"thorough-nodes", "thorough-rest", "colcon", "other-blas"}
+    assert beside | {"docs"} == set(ci.rpartition("--output-sync=target ")[2].split())
+    assert set(first) == beside
+    taken = [number + worker for number in first.values() for worker in range(4)]
+    taken.append(int(re.findall(r"ROS_DOMAIN_ID=(\d+)", make)[0]))
+    assert len(set(taken)) == len(taken)
+    assert not [number for number in taken if number in DOMAINS or number not in STATED]
 
 
 def test_what_runs_with_one_kernel_of_linear_algebra_elsewhere_runs_with_another_in_other_blas():
