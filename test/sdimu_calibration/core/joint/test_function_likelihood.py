@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
-from sdimu_calibration.core.joint.function_fit import Beside, _combined, _likelihood, needless
+from sdimu_calibration.core.joint.function_fit import Beside, needless
+from sdimu_calibration.core.joint.function_sizes import function_sizes, with_weights
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 
@@ -60,11 +61,25 @@ def test_it_is_that_of_the_measurements_themselves(size, varying, tau):
         covariance[own, own] += sum(tau) ** 2 * A[own][:, moving] @ A[own][:, moving].T
     expected = 0.5 * (y @ y - y @ np.linalg.solve(covariance, y) - np.linalg.slogdet(covariance)[1])
     fit = fit_of(varying, tau)
-    assert _likelihood(fit, reports, shared) == pytest.approx(expected, abs=1e-8)
+    assert function_sizes(fit, reports, shared).log_likelihood(shared.size) == pytest.approx(expected, abs=1e-8)
     gain = prior @ A.T @ np.linalg.inv(covariance)
-    told = _combined(fit, reports, shared).estimate(fit.tau)
+    told = with_weights(fit, reports, shared).estimate(fit.tau)
     np.testing.assert_allclose(told.values, gain @ y, rtol=1e-8)
     np.testing.assert_allclose(np.diag(told.covariance), np.diag(prior - gain @ A @ prior), rtol=1e-7)
+
+
+@pytest.mark.parametrize("tau", [[], [2e-6]])
+def test_the_likeliest_size_of_a_sensor_is_the_one_that_a_step_does_not_better(tau):
+    rng = np.random.default_rng(5)
+    weights = np.array([0.0, 0.0, 0.0, 1e-5, -4e-3, 2e-5, 3e-3])
+    fit = fit_of({"bias": ("gyro_bias_x",)} if tau else {}, tau)
+    sizes = function_sizes(fit, [recording(name, rng, lambda A: A @ weights) for name in "abc"], SHARED)
+    found = sizes.likeliest({})
+    best = sizes.log_likelihood(found)
+    assert best > sizes.log_likelihood(sizes.least) + 10.0
+    # The last one was sought with the others as they are told.
+    last = SHARED.sensors[-1]
+    assert all(sizes.log_likelihood({**found, last: found[last] * step}) < best for step in (0.7, 1.4))
 
 
 def test_an_effect_stays_where_the_data_need_it_and_goes_where_they_do_not():

@@ -35,7 +35,7 @@ def window(*models: tuple[tuple[int, ...], float], noises: tuple[NoiseModel, ...
     prior = prior_of(candidates)
     board = SimpleNamespace(
         use=np.arange(len(KEYS)),
-        evidence=SimpleNamespace(candidates=candidates, weight=()),
+        evidence=SimpleNamespace(candidates=candidates, candidate=candidates.__getitem__, weight=()),
         prior=prior,
         finer=frozenset(),
         data=lambda _: (0.0, Data(W.T @ W, W.T @ e, prior)),

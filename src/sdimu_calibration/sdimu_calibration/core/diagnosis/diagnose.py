@@ -22,7 +22,7 @@ from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise
 from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, searched
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, alike_in_window
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
@@ -112,8 +112,7 @@ class Diagnosis:
     @property
     def chosen(self) -> tuple[Candidate, ...]:
         """What was found: the largest share of the misfit first."""
-        p = len(self.evidence.weight)
-        return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
+        return self.found.candidates
 
     @property
     def unexplained(self) -> bool:
@@ -123,7 +122,7 @@ class Diagnosis:
     @property
     def alike(self) -> tuple[str, ...]:
         """What the data cannot tell from the first of `chosen`."""
-        return alike_first(self)
+        return self.found.alike(0)
 
     @cached_property
     def probabilities(self) -> Probabilities | None:
@@ -223,7 +222,7 @@ def climb(
     raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
-    facts = Facts(done.found, done.chosen, alike_first(done), findings, noise, own, bool(raised))
+    facts = Facts(done.found, done.chosen, done.found.alike(0), findings, noise, own, bool(raised))
     word = verdict(facts)
     progress("done", 1.0)
     unspoken = Diagnosis(
@@ -258,14 +257,6 @@ def _findings(base: Fit, widened: Fit, done: Round) -> tuple[Finding, ...]:
     findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
     findings += () if done.found.stood else (Finding(_TO_AND_FRO, grave=False),)
     return findings if widened.converged else (*findings, Finding(NOT_CONVERGED, grave=True))
-
-
-def alike_first(of: Round | Diagnosis) -> tuple[str, ...]:
-    """Labels of what the data cannot tell from the first effect of a choice, the others being in the model."""
-    chosen = of.found.chosen
-    if not len(chosen):
-        return ()
-    return alike_in_window(of.found.posterior, int(chosen[0])) if of.found.posterior else ()
 
 
 def p_value(done: Round, consistency: Consistency, noise: bool) -> float:

@@ -101,7 +101,6 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scores = problem.scores(scanned)
         z = float(scanned.z[column])
         count = int(np.isfinite(scanned.sigma[allowed]).sum())
-        others = _alike(d, column)
         probability, shares = d.may_be(column)
         out.append(
             Found(
@@ -115,8 +114,8 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 explained=float(np.clip((misfit[k] - misfit[k + 1]) / whole, 0.0, 1.0)),
                 held_out_before=held_out[k],
                 held_out_after=held_out[k + 1],
-                alike=tuple(d.evidence.names[i] for i in others),
-                coefficient_shifts=coefficient_shifts(problem, chosen, column, others),
+                alike=d.found.alike(k),
+                coefficient_shifts=coefficient_shifts(problem, chosen, column, d.found.columns_alike(k)),
                 probability=probability,
                 may_be=shares,
                 of_family=_of_family(d, column),
@@ -124,14 +123,6 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
             )
         )
     return tuple(out)
-
-
-def _alike(d: Diagnosis, column: int) -> list[int]:
-    """Columns that the data cannot tell from a chosen one, the likeliest first."""
-    window = d.found.posterior
-    if window is None:
-        return []
-    return [int(window.board.use[number]) for number in window.classes[window.place_of(column)]]
 
 
 def _together(d: Diagnosis, column: int) -> tuple[tuple[str, str, float], ...]:
@@ -181,8 +172,7 @@ def catalogue_columns(d: Diagnosis) -> Ints:
     ndarray of int, shape (c,)
         In ascending order.
     """
-    p = len(d.evidence.weight)
-    return np.array([i for i in looked_at(d) if d.evidence.candidates[i - p].family != "own"], dtype=np.int64)
+    return np.array([i for i in looked_at(d) if d.evidence.candidate(i).family != "own"], dtype=np.int64)
 
 
 @dataclass(frozen=True)

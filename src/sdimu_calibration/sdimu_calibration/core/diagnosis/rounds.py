@@ -64,8 +64,7 @@ class Round:
     @property
     def chosen(self) -> tuple[Candidate, ...]:
         """What this round chose."""
-        p = len(self.evidence.weight)
-        return tuple(self.evidence.candidates[i - p] for i in self.found.chosen)
+        return self.found.candidates
 
     @property
     def wants_equations(self) -> bool:
@@ -145,8 +144,7 @@ def _first_ground(request: Request, progress: Progress) -> Ground:
     if not base.contradiction(base.statistics()):
         return ground
     found = search(ground.evidence, ground.allowed, None, request.alpha)
-    p = len(found.evidence.weight)
-    strongest = [found.evidence.candidates[i - p] for i in found.chosen[:1]]
+    strongest = found.candidates[:1]
     return fresh_ground(request, extended(request, strongest, progress), strongest, False) if strongest else ground
 
 

@@ -16,6 +16,7 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import Scan
 from sdimu_calibration.core.diagnosis.step import Step, step_of
+from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike, with_intervals
 from sdimu_calibration.core.evidence.linear import E
@@ -67,6 +68,21 @@ class Search(Generic[E]):
     joint: Joint | None = None
     stood: bool = True
     posterior: Posterior[E] | None = None
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """What was found: the largest share of the misfit first."""
+        return tuple(self.evidence.candidate(column) for column in self.chosen.tolist())
+
+    def columns_alike(self, place: int) -> list[int]:
+        """Columns of what the data cannot tell from one of `chosen`, by its place there; the likeliest first."""
+        if self.posterior is None or place >= len(self.chosen):
+            return []
+        return self.posterior.alike(int(self.chosen[place]))
+
+    def alike(self, place: int) -> tuple[str, ...]:
+        """Labels of the same."""
+        return tuple(self.evidence.candidate(column).label for column in self.columns_alike(place))
 
 
 def search(
@@ -138,8 +154,7 @@ def with_steps(found: Search[E]) -> Search[E]:
     for k, column in enumerate(chosen):
         scanned = problem.scan(chosen[:k])
         after = problem.held_out(chosen[: k + 1])
-        alike = () if found.posterior is None else alike_in_window(found.posterior, column)
-        steps.append(step_of(problem, scanned, chosen[:k], column, found.threshold, before, after, alike))
+        steps.append(step_of(problem, scanned, chosen[:k], column, found.threshold, before, after, found.alike(k)))
         before = after
     return replace(found, steps=tuple(steps), noise=_stated(found))
 
@@ -187,8 +202,3 @@ def in_noise(board: Board[E], terms: Sequence[NoiseTerm]) -> E:
     if not terms or board.joint is None or board.wander is None:
         return board.evidence
     return board.evidence.with_noise(board.wander.modes(terms).columns, board.joint.in_noise(terms))
-
-
-def alike_in_window(found: Posterior[E], column: int) -> tuple[str, ...]:
-    """Labels of what the data cannot tell from a column that was chosen, the likeliest first."""
-    return tuple(found.candidate(number).label for number in found.classes[found.place_of(column)])

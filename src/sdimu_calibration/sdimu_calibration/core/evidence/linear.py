@@ -225,6 +225,10 @@ class LinearEvidence(ABC):
             worked_out=Information(J, np.concatenate([old.d, weighed.T @ self.e])),
         )
 
+    def candidate(self, column: int) -> Candidate:
+        """Candidate of a column of W that is none of the model's."""
+        return self.candidates[column - len(self.weight)]
+
     def only(self: E, columns: Ints) -> E:
         """Return the evidence with the model and some of the candidates alone.
 
@@ -241,7 +245,7 @@ class LinearEvidence(ABC):
             self,
             W=self.W[:, : len(keep)] if whole else self.W[:, keep],
             names=tuple(self.names[i] for i in keep),
-            candidates=tuple(self.candidates[i - p] for i in columns),
+            candidates=tuple(self.candidate(i) for i in columns),
             prior=self.prior[columns - p],
             worked_out=Information(full.J[np.ix_(keep, keep)], full.d[keep]),
         )

@@ -147,10 +147,28 @@ class Combination:
         tau : ndarray, shape (c,)
             SI.
         """
-        return self._reduced(tau)[0]
+        constant, information = self.integrated(tau)
+        return constant + information.log_likelihood(self.weight)
+
+    def integrated(self, tau: Floats) -> tuple[float, Information]:
+        """Integrate the deviations of all power-ons.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (c,)
+            SI.
+
+        Returns
+        -------
+        constant : float
+            What the log-likelihood has beside that of the information (1).
+        information : Information
+            On the parameters, each in its `unit`.
+        """
+        return self._reduced(tau)[:2]
 
     def _reduced(self, tau: Floats) -> tuple[float, Information, Floats, Floats]:
-        """Likelihood; information on the parameters; M^-1 of each power-on, and D [J d] of the varying rows."""
+        """Integrate as `integrated` does; M^-1 of each power-on and D [J d] of the varying rows besides."""
         v = self.varying
         D = self.sizes(tau)
         right = np.concatenate([self.J[:, v, :], self.d[:, v, None]], axis=2) * D[:, None]
@@ -159,14 +177,8 @@ class Combination:
         X = inverse @ right
         J = self.J.sum(axis=0) - np.einsum("gvp,gvq->pq", right[:, :, :-1], X[:, :, :-1])
         d = self.d.sum(axis=0) - np.einsum("gvp,gv->p", right[:, :, :-1], X[:, :, -1])
-        A = J + np.diag(self.weight)
-        likelihood = 0.5 * (
-            np.einsum("gv,gv->", right[:, :, -1], X[:, :, -1])
-            - np.linalg.slogdet(M)[1].sum()
-            - np.linalg.slogdet(A)[1]
-            + d @ np.linalg.solve(A, d)
-        )
-        return float(likelihood), Information(J, d), np.asarray(inverse), right
+        constant = 0.5 * (np.einsum("gv,gv->", right[:, :, -1], X[:, :, -1]) - np.linalg.slogdet(M)[1].sum())
+        return float(constant), Information(J, d), np.asarray(inverse), right
 
     def estimate(self, tau: Floats) -> JointEstimate:
         """Estimate all parameters and deviations, the sigmas given.
@@ -176,7 +188,8 @@ class Combination:
         tau : ndarray, shape (c,)
             Sigma of each component (SI).
         """
-        likelihood, information, inverse, right = self._reduced(tau)
+        constant, information, inverse, right = self._reduced(tau)
+        likelihood = constant + information.log_likelihood(self.weight)
         everything = np.arange(len(self.unit))
         values, covariance = information.estimate(everything, self.weight)
         D = self.sizes(tau)

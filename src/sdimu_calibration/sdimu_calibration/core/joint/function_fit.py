@@ -15,11 +15,12 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.attitude_functions import covering
-from sdimu_calibration.core.joint.combine import Combination, JointEstimate, Rows
+from sdimu_calibration.core.joint.combine import JointEstimate
+from sdimu_calibration.core.joint.function_sizes import function_sizes, with_weights
 from sdimu_calibration.core.joint.leftovers import with_places
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_evidence import own_values
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, columns_of, grouped_rows
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.noise_term import ATTITUDE, AXES, TRIADS
@@ -28,8 +29,6 @@ from sdimu_calibration.core.results import TurnOn
 
 _MOST = 150
 """Number of functions at most: several plans together cover more of the sphere than one."""
-_SIZES = np.geomspace(1e-3, 1e4, 57)
-"""Ratios of the sizes that are tried to the one at which a function is seen at all: neighbours differ by a third."""
 _LEARNINGS = 2
 """Number of times that each recording learns its noise beside the function: a third changes no size by a tenth."""
 
@@ -77,10 +76,11 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:
     shared = SharedFunction(functions, tuple(c for c in CHANNELS if c in sensors), {})
     reports = asked_again(fit, run, noise=(), function=shared)
     for _ in range(_LEARNINGS):
-        shared = replace(shared, size=_sizes(fit, reports, shared))
+        shared = replace(shared, size=function_sizes(fit, reports, shared).likeliest(shared.size))
         reports = asked_again(fit, run, noise=(), function=shared)
-    shared = replace(shared, size=_sizes(fit, reports, shared))
-    gain = _likelihood(fit, reports, shared) - _likelihood(fit, reports, _tiny(fit, reports, shared))
+    sizes = function_sizes(fit, reports, shared)
+    shared = replace(shared, size=sizes.likeliest(shared.size))
+    gain = sizes.log_likelihood(shared.size) - sizes.log_likelihood(sizes.least)
     estimate, turn_on = _estimated(fit, reports, shared)
     p = len(fit.names)
     of_fit = replace(estimate, values=estimate.values[:p], covariance=estimate.covariance[:p, :p])
@@ -127,8 +127,8 @@ def _without(beside: Beside, names: Sequence[str]) -> float:
     if shared is None:
         raise AssertionError("a function is needed")
     less, reports = _fit_without(fit, names), [_rows_without(r, fit, names) for r in beside.reports]
-    sized = replace(shared, size=_sizes(less, reports, shared))
-    return _likelihood(less, reports, sized)
+    sizes = function_sizes(less, reports, shared)
+    return sizes.log_likelihood(sizes.likeliest(shared.size))
 
 
 def _rows_without(report: Report, fit: SetFit, names: Sequence[str]) -> Report:
@@ -156,50 +156,11 @@ def _fit_without(fit: SetFit, names: Sequence[str]) -> SetFit:
     )
 
 
-def _sizes(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:
-    """Likeliest size of each sensor (SI), one after the other; what is not seen gets one that changes little."""
-    least = _seen(fit, reports, shared)
-    found = replace(shared, size=least | dict(shared.size))
-    for sensor in shared.sensors:
-        tried = [replace(found, size={**found.size, sensor: least[sensor] * ratio}) for ratio in _SIZES]
-        found = max(tried, key=lambda one: _likelihood(fit, reports, one))
-    return dict(found.size)
-
-
-def _seen(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> dict[str, float]:
-    """Size at which the function of a sensor is seen at all (SI)."""
-    p = len(fit.names)
-    seen = np.sum([np.sum(rows.A[:, p:] ** 2, axis=0) for rows in _rows(fit, reports, shared)], axis=0)
-    return {sensor: float(np.median(seen[shared.of(sensor)])) ** -0.5 for sensor in shared.sensors}
-
-
-def _tiny(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> SharedFunction:
-    """Make the function so small that it is as good as none."""
-    return replace(shared, size={k: float(_SIZES[0]) * size for k, size in _seen(fit, reports, shared).items()})
-
-
-def _rows(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> list[Rows]:
-    return grouped_rows(reports, (*fit.names, *shared.labels))
-
-
-def _combined(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> Combination:
-    groups = _rows(fit, reports, shared)
-    components = columns_of(fit.varying, fit.names) if len(groups) > 1 else []
-    return Combination(groups, np.concatenate([fit.weight, shared.known]), components)
-
-
-def _likelihood(fit: SetFit, reports: Sequence[Report], shared: SharedFunction) -> float:
-    """Log-likelihood of the sizes, coefficients and weights integrated over their priors (1)."""
-    combined, known = _combined(fit, reports, shared), np.concatenate([fit.weight, shared.known])
-    # Its own is that of parameters in units that hang on what is known of them.
-    return combined.log_likelihood(fit.tau) + float(np.log(combined.unit).sum() + 0.5 * np.log(known).sum())
-
-
 def _estimated(
     fit: SetFit, reports: Sequence[Report], shared: SharedFunction
 ) -> tuple[JointEstimate, tuple[TurnOn, ...]]:
     """Estimate coefficients and weights, and the scatter of the power-ons beside them."""
-    combined = _combined(fit, reports, shared)
+    combined = with_weights(fit, reports, shared)
     turn_on = turn_on_scatter(combined) if combined.components else ()
     return in_scatter(combined, turn_on), turn_on
 

@@ -261,9 +261,8 @@ def _first_ones(fit: SetFit, found: Search[SetEvidence], told: Sequence[Candidat
 
     The others may be what the linear model leaves of it.
     """
-    p, known = len(found.evidence.weight), {c.label: c for c in told}
-    chosen = [found.evidence.candidates[i - p] for i in found.chosen]
-    chosen = [known.get(c.label, c) for c in chosen]
+    known = {c.label: c for c in told}
+    chosen = [known.get(c.label, c) for c in found.candidates]
     new = [c.label for c in chosen if c.label not in known]
     worst = max(r.statistics.nis_mean for r in fit.reports)
     z = {step.label: abs(step.z) for step in found.steps}

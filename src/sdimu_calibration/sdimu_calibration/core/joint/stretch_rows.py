@@ -6,6 +6,7 @@ what it belongs to (`recurrence`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +15,16 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import CHANNELS, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.attitude_functions import way
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.joint.reduction import Reduction, reduced
+from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.joint.reduction import Reduction, reduced, unit_noise
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import TemperatureLog
 
 _READINGS = 9
@@ -67,7 +72,9 @@ class Places:
 def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
     """Compress what a recording says of its coefficients and of the errors in each dwell.
 
-    Noise with a memory that was learned is left out: it would take in what may come back.
+    Noise with a memory that was learned acts in turns alone: in dwells it would take in what may come back. Without it
+    a turn is trusted as in white noise, and what it makes wrong in a coefficient of all recordings comes back in their
+    dwells.
 
     Returns
     -------
@@ -78,12 +85,20 @@ def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
     evidence = fit.bare
     cut, own = _dwells(evidence.times), len(evidence.weight)
     labels = [f"{name} in dwell {k}" for k in range(len(cut)) for name in CHANNELS]
-    wide = replace(
-        evidence,
-        W=np.hstack([evidence.W[:, :own], evidence.constant_signature(cut)]),
-        names=(*evidence.names[:own], *labels),
-    )
+    W, e = np.hstack([evidence.W[:, :own], evidence.constant_signature(cut)]), evidence.e
+    if fit.noise_terms and isinstance(fit, NavigationFit):
+        noisy = unit_noise(_in_turns(fit.wander.in_white, fit.noise_terms), np.column_stack([W, e]))
+        W, e = noisy[:, :-1], noisy[:, -1]
+    wide = replace(evidence, W=W, e=e, names=(*evidence.names[:own], *labels))
     return reduced(wide), _places(evidence, cut, fit.test.recording.temperature)
+
+
+def _in_turns(wander: Wander, terms: Sequence[NoiseTerm]) -> Floats:
+    """Signatures (N, r) of what noise with a memory does in turns, of modes of unit variance."""
+    turning = np.zeros(wander.cut.cells, dtype=bool)
+    turning[: len(wander.cut)] = wander.cut.turning
+    cells = np.repeat(turning, len(CHANNELS))
+    return np.asarray(wander.U[:, cells] @ root_of(terms, wander.cut)[cells])
 
 
 def _dwells(times: Timetable) -> Stretches:

@@ -137,8 +137,7 @@ class Posterior(Generic[E]):
 
     def candidate(self, number: int) -> Candidate:
         """Candidate of a member."""
-        column = int(self.board.use[number])
-        return self.board.evidence.candidates[column - len(self.board.evidence.weight)]
+        return self.board.evidence.candidate(int(self.board.use[number]))
 
     def probability(self, holds: Callable[[Weighed], bool]) -> float:
         """Probability of the models for which something holds."""
@@ -223,6 +222,10 @@ class Posterior(Generic[E]):
     def place_of(self, column: int) -> int:
         """Place in the told model of a column of the evidence."""
         return self.board.columns(self.told.members).index(column)
+
+    def alike(self, column: int) -> list[int]:
+        """Columns of what the data cannot tell from a member of the told model, the likeliest first."""
+        return [int(self.board.use[number]) for number in self.classes[self.place_of(column)]]
 
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
         """Probability that a triad has noise of one of some kinds."""
