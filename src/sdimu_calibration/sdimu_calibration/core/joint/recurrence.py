@@ -139,7 +139,8 @@ def recurrence(left: Leftovers) -> Recurrence | None:
     left = left.only(np.flatnonzero(np.isin(left.sensor, loud)))
     alone = _tested(left, main, ())
     found = [kind for kind in KINDS if alone.largest(kind) > alone.limit]
-    answer, apart = (found, True) if len(found) < 2 else _needed(left, main, found)
+    with_same = [k for k in KINDS if k in found or (np.isfinite(alone.largest(k)) and _in_same_order(left, k, found))]
+    answer, apart = (with_same, len(with_same) < 2) if len(found) < 2 else _needed(left, main, found)
     return Recurrence(
         tuple(answer),
         apart,
@@ -152,11 +153,16 @@ def recurrence(left: Leftovers) -> Recurrence | None:
 
 def _needed(left: Leftovers, main: Sequence[int], found: Sequence[str]) -> tuple[Sequence[str], bool]:
     """Say which of several kinds are needed beside the others, and whether they can be told apart."""
-    if any(left.coincide(one, other) > _SAME_ORDER for one, other in combinations(found, 2)):
+    if any(_in_same_order(left, one, [other]) for one, other in combinations(found, 2)):
         return found, False
     given = {other: _tested(left, main, (other,)) for other in found}
     needed = [k for k in found if all(t.largest(k) > t.limit for other, t in given.items() if other != k)]
     return (needed, True) if needed else (found, False)
+
+
+def _in_same_order(left: Leftovers, kind: str, others: Sequence[str]) -> bool:
+    """Whether dwells have the same partners in a kind as in another: then nothing tells the two apart."""
+    return any(left.coincide(kind, other) > _SAME_ORDER for other in others)
 
 
 def _chance(left: Leftovers, group: int) -> FreeInputTest:
