@@ -152,6 +152,24 @@ def broken_rules(page: Any) -> list[str]:
     ]
 
 
+_CROSSING = """() => Array.from(document.querySelectorAll('.js-plotly-plot')).flatMap(figure => {
+    const upright = e => !/rotate\\((?!-90|0)/.test(e.getAttribute('transform') || '');
+    const words = Array.from(figure.querySelectorAll('[class$="tick"] text, [class*="-"] > text[class$="title"]'))
+        .filter(e => e.textContent.trim() && upright(e)).map(e => [e.textContent, e.getBoundingClientRect()]);
+    const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+        && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 4;
+    return words.flatMap(([one, box], k) => words.slice(k + 1).filter(([, other]) => over(box, other))
+        .map(([other]) => `${figure.id}: ${one} / ${other}`));
+})"""
+"""Labels of a figure that lie upon each other by more than the room that a font leaves around a word."""
+
+
+def crossing_labels(page: Any) -> list[str]:
+    """Name the labels of axes that cross another one of their figure."""
+    found: list[str] = page.evaluate(_CROSSING)
+    return found
+
+
 _SEEN = """number => {
     const seen = document.querySelector('#ranking .js-plotly-plot')._hoverdata;
     return Boolean(seen) && seen[0].pointNumber === number;

@@ -17,7 +17,7 @@ from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 
-from .conftest import broken_rules
+from .conftest import broken_rules, crossing_labels
 
 OPEN_S = 1.5
 """Time of processor until the page can be read (s): a page that is opened often must not be waited for."""
@@ -74,6 +74,45 @@ def test_the_first_screen_answers(opened: Any, diagnosis: Diagnosis) -> None:
         assert opened.locator(f"#verdict {part}").last.evaluate(below) <= 900, part
     (found,) = diagnosis.chosen
     assert found.effect.title in opened.locator(".verdict .head").inner_text()
+
+
+def test_the_map_gives_way_to_words_and_keeps_its_numbers(browser: Any, report: Path) -> None:
+    """A second effect, open besides, takes three lines of advice more."""
+    words = "<li>To tell one from another: " + "stay at the last stop for 20 min more. " * 4 + "</li>"
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page.add_init_script(
+        "document.addEventListener('DOMContentLoaded', () =>"
+        f"document.querySelector('#verdict ol').insertAdjacentHTML('beforeend', '{words}'))"
+    )
+    page.goto(report.as_uri())
+    page.wait_for_function("document.querySelector('#verdict .js-plotly-plot .main-svg')")
+    bottom = page.evaluate("document.querySelector('.pictures .card:last-child .quiet').getBoundingClientRect().bottom")
+    assert bottom <= 900
+    rows = page.evaluate("document.querySelector('#verdict .js-plotly-plot')._fullLayout.yaxis._length") / 12
+    size = page.evaluate("document.querySelector('#verdict .js-plotly-plot')._fullData[0].textfont.size")
+    assert rows > size
+    page.close()
+
+
+@pytest.mark.parametrize("width", [800, 1440])
+def test_no_label_of_a_figure_crosses_another(browser: Any, report: Path, width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 1000})
+    page.goto(report.as_uri())
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    page.evaluate("sdimuDrawAll()")
+    page.wait_for_function("document.querySelectorAll('.figure:not([data-drawn])').length === 0")
+    assert crossing_labels(page) == []
+    page.close()
+
+
+def test_on_a_screen_of_4k_figures_are_written_as_large_as_the_page(browser: Any, report: Path) -> None:
+    page = browser.new_page(viewport={"width": 3840, "height": 2160})
+    page.goto(report.as_uri())
+    page.wait_for_function("document.querySelector('#verdict .js-plotly-plot .main-svg')")
+    size = "e => parseFloat(getComputedStyle(e).fontSize)"
+    label = page.locator("#verdict .ytick text").first.evaluate(size)
+    assert label >= page.locator("#verdict .quiet").first.evaluate(size)
+    page.close()
 
 
 def test_the_heat_map_shows_one_model_at_a_time(opened: Any) -> None:

@@ -126,7 +126,7 @@ UNITS = {*data.CHANNEL_UNITS, *measured.UNITS}
 
 
 def test_every_axis_says_its_quantity_and_unit(diagnosis, more):
-    """Axes that share the scale of another may leave the words to it, never both."""
+    """An axis may leave the words to one whose scale it shares, or the unit to the first of its row, never both."""
     for name, figure in all_figures(diagnosis, more).items():
         for letter in "xy":
             axes = {key: axis for key, axis in figure.layout.items() if key.startswith(f"{letter}axis")}
@@ -134,6 +134,7 @@ def test_every_axis_says_its_quantity_and_unit(diagnosis, more):
             for key, axis in axes.items():
                 title = said[key]
                 shared = "matches" in axis or axis.get("showticklabels") is False or _shares(axes, key)
+                shared = shared or any(said[k] in UNITS for k in axes if letter == "y" and _in_row(axes[k], axis))
                 assert title or shared, (name, key)
                 if title:
                     bare = title.replace("<br>", " ")
@@ -143,6 +144,10 @@ def test_every_axis_says_its_quantity_and_unit(diagnosis, more):
 
 def _shares(axes, key):
     return any(other.get("matches") == key.replace("axis", "") for other in axes.values())
+
+
+def _in_row(one, other):
+    return one.get("domain") == other.get("domain")
 
 
 def test_dashes_tell_compensations_apart(more):

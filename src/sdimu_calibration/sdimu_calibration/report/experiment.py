@@ -92,7 +92,8 @@ def raw_data(recording: Recording, fit: Fit) -> Figure:
         )
         for _, start, end in fit.timetable.stops:
             figure.shade(x0=start / 60.0, x1=end / 60.0, **place)
-        figure.y_axes(title=unit, standoff=4, showgrid=False, **place)
+        figure.y_axes(showgrid=False, **place)
+        figure.y_axes(title=unit, standoff=4, row=place["row"], col=1)
     figure.x_axes(title="time (min)", row=2)
     figure.x_axes(showgrid=False)
     return lay_out(figure, 430, margin={"l": 65, "r": 15, "t": 40, "b": 50})

@@ -41,7 +41,7 @@ def overlay(values: Overlay) -> Figure:
                 hovertemplate=f"%{{x:.1f}} min: %{{y:.5g}} {UNITS[channel]}<extra>{name}</extra>",
                 **place,
             )
-        figure.y_axes(title=UNITS[channel], standoff=2, **place)
+        figure.y_axes(title=UNITS[channel], standoff=2, row=place["row"], col=1)
     figure.x_axes(title="time (min)", row=4)
     figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, nticks=6)
     return lay_out(figure, 820, showlegend=True, margin={"l": 65, "r": 20, "t": 95, "b": 55}, legend=_LEGEND)

@@ -64,7 +64,9 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
             )
         reach = _reach([found.before[:, channel], found.after[:, channel]], found.sigma[:, channel], channel < 6)
         reach *= from_si(1.0, data.CHANNEL_UNITS[channel])
-        figure.y_axes(range=[-reach, reach], title=data.CHANNEL_UNITS[channel], standoff=2, **place)
+        figure.y_axes(range=[-reach, reach], **place)
+        # Panels of a row have one unit.
+        figure.y_axes(title=data.CHANNEL_UNITS[channel], standoff=2, row=place["row"], col=1)
     figure.x_axes(title="time (min)", row=4)
     figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
     return lay_out(
@@ -151,7 +153,7 @@ def against_variables(
     used = [k for k in columns if np.ptp(variables[rest, k]) > 0]
     if not used:
         return None
-    figure = Figure(rows=6, cols=len(used), share_x=True, share_y=True, gap_y=0.02, gap_x=0.012)
+    figure = Figure(rows=6, cols=len(used), share_x=True, share_y=True, gap_y=0.02, gap_x=0.03)
     for row in range(6):
         for column, k in enumerate(used, 1):
             name, unit = names[k]
@@ -175,7 +177,8 @@ def against_variables(
     for column, k in enumerate(used, 1):
         figure.x_axes(title=f"{names[k][0]} ({names[k][1]})", row=6, col=column)
     figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, nticks=5)
-    figure.x_axes(nticks=5, tickangle=0)
+    # Six panels share a window of 800 pixels: more numbers would touch those of the next panel.
+    figure.x_axes(nticks=3, tickangle=0)
     return lay_out(figure, 760, showlegend=True, margin={"l": 80, "r": 20, "t": 40, "b": 60})
 
 
@@ -221,7 +224,7 @@ def free_inputs(found: data.FreeInputs, two: bool) -> Figure:
                 hovertemplate=f"%{{x:.1f}} min: %{{y:.3g}} {unit}<extra></extra>",
                 **place,
             )
-        figure.y_axes(title=unit, standoff=2, **place)
+        figure.y_axes(title=unit, standoff=2, row=place["row"], col=1)
     figure.x_axes(title="time (min)", row=2)
     figure.y_axes(zeroline=True, zerolinecolor=MUTED, zerolinewidth=1)
     return lay_out(

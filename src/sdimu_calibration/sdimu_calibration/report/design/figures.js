@@ -1,6 +1,8 @@
 // Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
 (function () {
   var LARGE = 1.5, NEAR = '400px', CELL = 29, BAR = 80, NOTABLE = 3, queue = [], library = null;
+  // Width of a digit below a map and what keeps labels apart; least height of the map of a first screen (px).
+  var DIGIT = 8, APART = 8, LEAST = 250;
 
   // The library lies in the page compressed: it is unpacked once, after the page is there.
   function load() {
@@ -35,6 +37,8 @@
     }
     if (window.innerWidth >= 2400) {
       enlarge(figure, LARGE);
+      // What states no size of its own has that of the template.
+      figure.layout.font = Object.assign({size: LARGE * figure.layout.template.layout.font.size}, figure.layout.font);
       Object.keys(figure.layout.margin).forEach(function (side) { figure.layout.margin[side] *= LARGE; });
       figure.layout.height *= LARGE;
     }
@@ -52,10 +56,33 @@
     });
   }
 
+  // Below a map of many stops every second or third number stands, upright, where all of them would touch.
+  function fitLabels(figure, width) {
+    var axis = figure.layout.xaxis, trace = figure.data[0];
+    if (!trace || trace.type !== 'heatmap' || axis.type !== 'category') { return; }
+    var longest = Math.max.apply(null, trace.x.map(function (x) { return String(x).length; }));
+    if (longest > 3) { return; }
+    var cell = (width - figure.layout.margin.l - figure.layout.margin.r - BAR) / trace.x.length;
+    axis.tickangle = 0; axis.dtick = Math.max(1, Math.ceil((DIGIT * longest + APART) / cell));
+  }
+
+  // The map of a first screen gives way to the words above it, as far as its rows still hold a number.
+  function fitHeight(place, box, height) {
+    box.style.height = height + 'px';
+    var card = place.closest('#verdict .card');
+    if (!card) { return height; }
+    var free = window.innerHeight - window.scrollY - card.getBoundingClientRect().bottom + height;
+    if (free >= height || free < LEAST * (window.innerWidth >= 2400 ? LARGE : 1)) { return height; }
+    box.style.height = Math.floor(free) + 'px';
+    return Math.floor(free);
+  }
+
   function draw(place) {
-    var figure = content(place), box = place.firstElementChild;
-    box.style.height = figure.layout.height + 'px';
-    fitNumbers(figure, place.clientWidth * (window.innerWidth >= 2400 ? 1 / LARGE : 1));
+    var figure = content(place), box = place.firstElementChild, width = place.clientWidth;
+    figure.layout.height = fitHeight(place, box, figure.layout.height);
+    if (window.innerWidth >= 2400) { width /= LARGE; }
+    fitNumbers(figure, width);
+    fitLabels(figure, width);
     place.dataset.drawn = 'yes';
     Plotly.react(box, figure.data, figure.layout, FIGURE_CONFIG);
   }

@@ -120,7 +120,7 @@ def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[s
     for k in range(len(some), rows * _PANELS):
         figure.x_axes(visible=False, row=1 + k // _PANELS, col=1 + k % _PANELS)
         figure.y_axes(visible=False, row=1 + k // _PANELS, col=1 + k % _PANELS)
-    figure.x_axes(row=rows, title="date" if dated else "result, in the order of the list")
+    figure.x_axes(row=rows, title="date" if dated else "result, as listed")
     return lay_out(figure, 90 + 190 * rows)
 
 
