@@ -127,7 +127,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     ),
     Kind.TURN_BACK: lambda minutes: f"add a turn of 180 deg about that axis in the other sense ({minutes:.0f} min)",
     Kind.STAY_AND_RETURN: lambda stay, again: (
-        f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({again:.0f} min)"
+        f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({stay + again:.0f} min)"
     ),
     Kind.REST_ON_DIAGONAL: lambda minutes: (
         f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({minutes:.0f} min), or run the plan "
