@@ -55,6 +55,18 @@ def test_limits_are_judged_in_the_file_on_the_page_and_in_the_terminal(batch, tm
     assert "fail" in told
 
 
+def test_a_sheet_that_is_held_against_nothing_has_no_column_for_it(batch, tmp_path):
+    folder = batch(units=1, each=1)
+    datasheet([folder])
+    page = (folder / "datasheet.html").read_text()
+    assert '<th class="text">value</th>' in page
+    assert not re.search(r"<th[^>]*>(limit|verdict)</th>|Pass: the whole", page)
+    limits = tmp_path / "limits.yaml"
+    limits.write_text("format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n")
+    datasheet([folder], limits=limits)
+    assert re.search(r"Pass: the whole.*<th[^>]*>limit</th>", (folder / "datasheet.html").read_text(), re.DOTALL)
+
+
 def test_the_certificate_is_of_one_unit_with_the_hashes_of_its_recordings(batch, tmp_path, capsys):
     folder = batch(units=3, each=2)
     (folder / "bag_1_0").mkdir()

@@ -135,21 +135,27 @@ def _limit(line: Line) -> str:
     return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(f"{line.term}: {value}")}</li>'
 
 
+_JUDGED = ("limit", "verdict")
+"""Columns of a sheet that is held against limits."""
+
+
 def _table(lines: Sequence[Line]) -> str:
     """Lines that were measured or have a limit, gyros first."""
-    heads = ("term", "value", "95 % interval", "unit", "rms", "n", "limit", "verdict", "how and where")
     body, same = [], _same_conditions(lines)
     shown = [line for line in lines if math.isfinite(line.value) or math.isfinite(line.limit)]
+    judged = any(line.verdict for line in shown)
+    heads = ("term", "value", "95 % interval", "unit", "rms", "n", *(_JUDGED if judged else ()), "how and where")
     for triad in ("gyro", "accelerometer"):
         own = [line for line in shown if line.term.startswith(f"{triad} ")]
         if own:
             body.append(f'<tr class="group"><td colspan="{len(heads)}">{triad}s</td></tr>')
-        body += [_line(line if line.condition != same else replace(line, condition=""), triad) for line in own]
+        told = [line if line.condition != same else replace(line, condition="") for line in own]
+        body += [_line(line, triad, judged) for line in told]
     head = "".join(f'<th class="text">{escape(word)}</th>' for word in heads)
     text = (
         "Value: the largest over axes and units, with its 95 % interval (all axes together); rms: over axes and units; "
-        "n: recordings. Pass: the whole interval is inside the limit; undecided: it straddles it."
-    )
+        "n: recordings."
+    ) + (" Pass: the whole interval is inside the limit; undecided: it straddles it." if judged else "")
     return section(
         "What was measured",
         quiet(text),
@@ -157,7 +163,7 @@ def _table(lines: Sequence[Line]) -> str:
     )
 
 
-def _line(line: Line, triad: str) -> str:
+def _line(line: Line, triad: str, judged: bool) -> str:
     _, value, bounds, unit, number, limit, verdict = _row(line)
     rms = _size(line.rms, line.display_unit) if math.isfinite(line.rms) else ""
     how = "; ".join(word for word in (line.of, line.method, line.condition, line.missing) if word)
@@ -168,8 +174,7 @@ def _line(line: Line, triad: str) -> str:
         (unit, "text number"),
         (rms, "number"),
         (number, "number"),
-        (limit, "number"),
-        (verdict, verdict.split(" ")[0]),
+        *([(limit, "number"), (verdict, verdict.split(" ")[0])] if judged else []),
         (how, "text quiet"),
     ]
     return "<tr>" + "".join(f'<td class="{kind}">{escape(text)}</td>' for text, kind in texts) + "</tr>"
