@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sdimu_calibration.report.live_page import figures
 from sdimu_calibration.report.live_page.app import build
+from sdimu_calibration.report.live_page.curves import Drawn
 from sdimu_calibration.report.live_page.record import End, LiveRecord
 from sdimu_calibration.report.live_page.visitors import Visitors
 from sdimu_calibration.report.live_text import SeenChoice, SeenDiagnosis
@@ -96,6 +98,27 @@ def test_the_page_shows_where_the_test_is_what_it_knows_and_where_it_fails():
     assert told.index("Y +90 deg: brings gyro_bias") < told.index("X -180 deg: brings accel_bias")
     assert "1.61" in told
     assert shown["candidate"]["options"][0]["value"] == "gyro_scale_asymmetry_y"
+
+
+def test_stops_are_written_upright_and_shares_at_every_step_that_a_person_reads():
+    """Twenty-eight numbers side by side would touch each other, or be turned on their side."""
+    stops = tuple(map(str, range(28)))
+    seen = replace(MISFIT, stops=stops, heat=np.zeros((2, 28)))
+    shown = Page(record_of(Now(diagnosis=seen, nis_by_stop=dict.fromkeys(range(28), NIS)))).ask()
+    for name in ("heat", "nis"):
+        axis = shown[name]["figure"]["layout"]["xaxis"]
+        assert (axis["tickangle"], axis["dtick"]) == (0, 2)
+    axis = shown["sigmas"]["figure"]["layout"]["yaxis"]
+    assert (axis["dtick"], axis["tickformat"]) == ("D2", ".2~%")
+
+
+def test_a_screen_of_4k_has_words_cells_and_room_for_them_larger():
+    small, large = (figures.sigmas(Drawn((60.0,), {"gyro_bias": (0.5,)}), ()) for _ in range(2))
+    one, other = figures.finished(small, {"scale": 1.0})["layout"], figures.finished(large, {"scale": 1.6})["layout"]
+    for part in (lambda made: made["legend"]["font"]["size"], lambda made: made["legend"]["entrywidth"]):
+        assert part(other) == pytest.approx(1.6 * part(one))
+    cells = figures.finished(figures.heat_map(MISFIT), {"scale": 1.6})["data"][0]["textfont"]["size"]
+    assert cells == pytest.approx(1.6 * figures.heat_map(MISFIT).data[0]["textfont"]["size"])
 
 
 def test_probabilities_are_told_by_family_with_their_members_folded():

@@ -36,9 +36,13 @@ _FONT = {"size": 12}
 _KEPT = "kept"
 """Name under which plotly keeps what a person zoomed, while a figure grows."""
 _MARGIN = {"l": 60, "r": 14, "t": 10, "b": 44}
-_LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": 10}}
+_LEGEND_FONT = 11
+"""Size of the words of a legend (px)."""
+_LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": _LEGEND_FONT}}
 _ENTRY = 176
 """Width of the words of an entry of the legend (px): two stand beside each other in a column of 470."""
+_LABELS = 14
+"""Number of stops that are written below a map: more would touch each other, or be turned on their side."""
 _SENSORS = ("gyro", "accel")
 
 
@@ -70,7 +74,7 @@ def sigmas(curves: Drawn, fallen: Sequence[Falling]) -> Figure:
             hovertemplate=f"{literal(title(effect))}: %{{y:.2g}} of its sigma at the start<extra></extra>",
         )
     figure.x_axes(title="time of the test (min)", rangemode="tozero", standoff=4)
-    figure.y_axes(title="sigma over that at the start", type="log", dtick=1, exponentformat="power", standoff=4)
+    figure.y_axes(title="sigma, share of the start", type="log", dtick="D2", tickformat=".2~%", standoff=4)
     legend = _LEGEND | {"x": -0.2, "y": -0.24, "entrywidth": _ENTRY}
     more = {"showlegend": True, "legend": legend, "margin": _MARGIN | {"b": 124}, "uirevision": _KEPT}
     return _laid_out(figure, HEIGHT + 60, **more)
@@ -127,7 +131,8 @@ def _whole(value: float) -> str:
 
 
 def _by_stop(figure: Figure, height: int) -> Figure:
-    figure.x_axes(title="stop", type="category", showgrid=False, ticks="", standoff=2)
+    every = math.ceil(len(figure.data[0]["x"]) / _LABELS)
+    figure.x_axes(title="stop", type="category", showgrid=False, ticks="", tickangle=0, dtick=every, standoff=2)
     figure.y_axes(autorange="reversed", ticks="", automargin=True, title="")
     return _laid_out(figure, height, margin=_MARGIN | {"l": 70, "b": 40})
 
@@ -181,7 +186,7 @@ def _laid_out(figure: Figure, height: int, **more: Any) -> Figure:
 
 
 def finished(figure: Figure, look: Any) -> Any:
-    """Make a figure for the page: in its theme, and higher on a screen of many pixels.
+    """Make a figure for the page: in its theme, and all of it larger on a screen of many pixels.
 
     Parameters
     ----------
@@ -193,4 +198,11 @@ def finished(figure: Figure, look: Any) -> Any:
         figure.layout["height"] *= scale
         figure.layout["font"] = {"size": 12 * scale}
         figure.layout["margin"] = {side: value * scale for side, value in figure.layout["margin"].items()}
+        legend = figure.layout["legend"]
+        figure.layout["legend"] = legend | {"font": {"size": _LEGEND_FONT * scale}}
+        if "entrywidth" in legend:
+            figure.layout["legend"]["entrywidth"] = legend["entrywidth"] * scale
+        for trace in figure.data:
+            if "textfont" in trace:
+                trace["textfont"] = {"size": trace["textfont"]["size"] * scale}
     return figure.content(str(look.get("theme", "light")))
