@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.set_run import page_title, table_heading
-from sdimu_calibration.core.results import Calibration, SetSummary, no_history
+from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary, no_history
 from sdimu_calibration.report.page import Contents, page
 
 RESULT = Calibration(
@@ -51,6 +51,16 @@ def test_a_title_counts_what_was_used(file, refused, title):
 def test_the_table_names_what_was_refused():
     assert table_heading(of(2, "c.mcap")).startswith("2 of 3 recordings together, without c.mcap,")
     assert table_heading(of(2)).startswith("2 recordings together, body frame")
+
+
+@pytest.mark.parametrize(("names", "said"), [(("day1", "day2"), "day1, day2<"), ("abcdef", "a, b, c, d and others<")])
+def test_the_page_says_beside_its_title_which_recordings_it_is_of(names, said):
+    value = np.array([1e-4])
+    parts = tuple(
+        SetRecording(name, "", "", 0, np.nan, 60.0, 6000.0, 1.0, value, 0.1 * value, 0.0 * value) for name in names
+    )
+    told = replace(RESULT, of_set=replace(RESULT.of_set, recordings=parts))
+    assert f'<span class="about grow">{said}' in page(told, Contents("x"))
 
 
 def test_the_page_names_it_above_the_table():

@@ -110,6 +110,7 @@ def calibrate_together(asked: SetRequest) -> None:
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves set.json, result.json and report.html."""
+    from sdimu_calibration.core.error_figures import held_out
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
     from sdimu_calibration.storage.files.result_file import write_result
@@ -133,6 +134,9 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         )
     printed(folder / "report.html")
     say(console, f"{found.verdict}: {found.sentence}")
+    if found.error_without is not None:
+        fell = f"{found.error_without:.3f} -> {held_out(found.after):.3f}"
+        say(console, f"held-out error, a recording left out at a time, in one noise: {fell}")
     _show(console, after, diagnosed=True)
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")

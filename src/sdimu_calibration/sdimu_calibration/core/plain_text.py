@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 LONGEST_LINE = 500
 """Number of characters of a line shown to a user: six lines of a terminal; more hides what it says."""
 _TAIL = 160
@@ -41,6 +43,11 @@ def counted(number: int, one: str, many: str = "") -> str:
         What stands behind one, and behind any other number; `one` with an s by default.
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """Write names one after the other, of more than `most` the first ones."""
+    return ", ".join(names[:most]) + (" and others" if len(names) > most else "")
 
 
 def capital(text: str) -> str:

@@ -19,7 +19,7 @@ from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_h
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.note import without_advice
-from sdimu_calibration.core.plain_text import capital
+from sdimu_calibration.core.plain_text import capital, first_of
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
@@ -130,7 +130,7 @@ def _remarks(calibration: Calibration) -> tuple[str, ...]:
 def _unseen(summary: DiagnosisSummary) -> str:
     """Say how many effects may be there unseen, and what would show most of them."""
     hidden, most = [one for one in summary.reached if not one.testable], summary.untestable[0]
-    names = ", ".join(most.labels[:_WORST]) + (" and others" if len(most.labels) > _WORST else "")
+    names = first_of(most.labels, _WORST)
     return (
         f"{len(hidden)} of {len(summary.reached)} effects could not have been seen in this test, and spoil the "
         f"coefficients if they are there: {names} ({most.reason})."
@@ -157,7 +157,7 @@ def _off(one: Off) -> tuple[str, str]:
     """Say by how much a coefficient is wrong."""
     amount = f"{one.alone} {one.unit}".replace("-", "\N{MINUS SIGN}")
     known = f"(\N{PLUS-MINUS SIGN}{one.known})"
-    return amount, f"<code>{escape(one.name)}</code> off {known}: {abs(one.sigmas):.1f} of its sigmas"
+    return amount, f"<code>{escape(one.name)}</code> off {known}, {abs(one.sigmas):.1f} sigmas"
 
 
 def _in_noise(error: float) -> tuple[str, str]:

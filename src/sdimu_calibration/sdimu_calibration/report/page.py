@@ -15,6 +15,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.results import Calibration, Rest
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, experiment, first_screen, handheld_sections, sections
@@ -96,6 +97,10 @@ def write_report(
     """
     contents = Contents(title, truth, reference, summary, more, fit, of_set, trace, spell)
     write_whole(path, page(calibration, contents))
+
+
+_NAMED = 4
+"""Number of recordings of a set that stand beside the title."""
 
 
 class _Drawing:
@@ -182,8 +187,9 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None
 def _under(calibration: Calibration) -> str:
     """Say which recording it is of, beside the title."""
     origin, counts = calibration.origin, calibration.data
+    together = () if calibration.of_set is None else calibration.of_set.recordings
     words = [
-        origin.recording,
+        origin.recording or first_of([one.name for one in together], _NAMED),
         recorded(origin.start_ns),
         f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
         f"IMU {origin.imu}" if origin.imu else "",

@@ -182,7 +182,7 @@ def diagnose_set(
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
     beside_function = found.after.function is not None
-    sentence = f"{_sentence(word, findings, (without, after), again, beside_function)} {why}".strip()
+    sentence = f"{_sentence(word, findings, after, again, beside_function)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -309,29 +309,19 @@ def _scatter(result: Calibration) -> float:
 
 
 def _sentence(
-    word: Verdict,
-    findings: Sequence[SetFinding],
-    errors: tuple[float | None, Calibration],
-    again: Recurrence | None,
-    function: bool,
+    word: Verdict, findings: Sequence[SetFinding], after: Calibration, again: Recurrence | None, function: bool
 ) -> str:
     """Say what was found, then what comes back of that what the model leaves.
 
-    `errors` are the one without what was found, in the noise of the result with it, and that result. Where a `function`
-    of the attitude explains what is left, stops that do not come back are too few, and say nothing.
+    Where a `function` of the attitude explains what is left, stops that do not come back are too few, and say nothing.
     """
     tells = again is not None and (not function or len(again.answer) > 0)
     more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
-    return f"{_found(word, findings, *errors, again, function)} {more}".strip()
+    return f"{_found(word, findings, after, again, function)} {more}".strip()
 
 
 def _found(
-    word: Verdict,
-    findings: Sequence[SetFinding],
-    without: float | None,
-    after: Calibration,
-    again: Recurrence | None,
-    function: bool,
+    word: Verdict, findings: Sequence[SetFinding], after: Calibration, again: Recurrence | None, function: bool
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
@@ -346,8 +336,7 @@ def _found(
         shared = function or (again is not None and again.answer and not _odd(after))
         what = "The recordings share something" if shared else "Something differs between the recordings"
         return f"{what} that no effect of the catalogue explains.{most}{'' if function else _odd(after)}"
-    falls = f"error at recordings held out, in one noise: {_shown(without)} -> {_rms(after)}"
-    return f"{in_grades(list(map(_graded, findings)))} {falls[0].upper()}{falls[1:]}."
+    return in_grades(list(map(_graded, findings)))
 
 
 def _graded(f: SetFinding) -> Graded:
@@ -388,11 +377,7 @@ def _odd(result: Calibration) -> str:
 
 
 def _rms(result: Calibration) -> str:
-    return _shown(result.fit["held_out_rms"])
-
-
-def _shown(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+    return f"{result.fit['held_out_rms']:.3f}"
 
 
 def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:
