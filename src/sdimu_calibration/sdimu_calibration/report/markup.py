@@ -63,6 +63,11 @@ def prose(text: str) -> str:
     return escape(text.replace(" -> ", " \N{RIGHTWARDS ARROW} ").replace(" +- ", " \N{PLUS-MINUS SIGN} "))
 
 
+def signs(text: str) -> str:
+    """Return a sentence of a diagnosis with the signs of print for what a terminal writes with its own."""
+    return text.replace(" +- ", " \N{PLUS-MINUS SIGN} ").replace("(-", "(\N{MINUS SIGN}")
+
+
 def quiet(text: str) -> str:
     """Return a remark."""
     return f'<p class="quiet">{prose(text)}</p>'

@@ -11,11 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.cost import wrong_without
+from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.parts import numbers
@@ -149,6 +153,16 @@ def test_the_loop_finds_adds_and_takes_home_the_hidden_effect(app, recording, tm
         # Passes end when nothing moves by 0.005 sigma; two ways to get there may differ by twice that.
         assert abs(result[name]["value"] - value) <= 0.01 * s + 1e-15
     assert (tmp_path / "report.html").stat().st_size < 6e6
+
+
+def test_the_verdict_leads_with_what_is_wrong_by_the_figure_of_the_report(app, bench):
+    """An error near 1 says nothing of a coefficient that is many sigmas off."""
+    fit = solve(bench.test, bench.model)
+    found = climb(fit)
+    (worst, *_) = wrong_without(summarise(found), report_extras(found, fit))
+    assert bench.missing(Setting()).worst.text == worst.text
+    told = Page(app).verdict
+    assert f"Wrong without it: {worst.text}.".replace("+-", "\N{PLUS-MINUS SIGN}") in told
 
 
 def test_an_effect_of_ones_own_does_what_the_registered_one_does(app, bench):

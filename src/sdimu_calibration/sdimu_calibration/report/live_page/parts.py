@@ -13,6 +13,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.groups import title
 from sdimu_calibration.report.live_page.record import End, Head, LiveView, catalogue
 from sdimu_calibration.report.live_text import SeenChoice, SeenDiagnosis, SeenFamily
+from sdimu_calibration.report.markup import signs
 
 _LEAST, _MOST_FAMILIES = 0.05, 8
 """Probability (1) from which a family is listed, and how many are at most: less is one of many."""
@@ -56,8 +57,7 @@ def verdict(seen: SeenDiagnosis) -> tuple[str, str]:
     if seen.stop < 0:
         return NOT_YET, "verdict neutral"
     tone, mark = _TONES.get(Verdict(seen.verdict), _DOUBTFUL)
-    said = seen.sentence.replace(" +- ", " \N{PLUS-MINUS SIGN} ").replace("(-", "(\N{MINUS SIGN}")
-    return f"{mark} Up to stop {seen.stop}: {said}", f"verdict {tone}"
+    return f"{mark} Up to stop {seen.stop}: {signs(seen.sentence)}", f"verdict {tone}"
 
 
 def candidates(seen: SeenDiagnosis) -> list[Any]:

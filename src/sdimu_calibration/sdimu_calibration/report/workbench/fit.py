@@ -37,6 +37,8 @@ from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
+from sdimu_calibration.report.cost import Off, wrong_without
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
@@ -107,6 +109,8 @@ class Missing:
         Of nothing, and of each family of effects, as `sdimu diagnose` has them.
     unknown : tuple of UnknownFunction
         Errors that no effect explains, by what they follow.
+    worst : Off or None
+        The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
     """
 
     entries: tuple[data.Scored, ...]
@@ -118,6 +122,7 @@ class Missing:
     probabilities: Probabilities | None = None
     unknown: tuple[UnknownFunction, ...] = ()
     mended: bool = False
+    worst: Off | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +176,7 @@ class FitSession:
                 scores = self._survey(setting, tell)
                 told = climb(scores.fit, progress=tell)
                 summary = summarise(told)
+                off = wrong_without(summary, ReportExtras(given=scores.after))
                 found = Missing(
                     tuple(data.scored(scores)),
                     scores.found.threshold,
@@ -181,6 +187,7 @@ class FitSession:
                     told.probabilities,
                     unknown_of(told),
                     bool(summary.candidates) and told.verdict != Verdict.DATA_FAULT,
+                    off[0] if off else None,
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]

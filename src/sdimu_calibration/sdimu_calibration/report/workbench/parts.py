@@ -12,6 +12,7 @@ from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
+from sdimu_calibration.report.markup import signs
 from sdimu_calibration.report.odds_section import family_in_words
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
@@ -42,14 +43,14 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.mended or (missing.adequate and objections):
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    said = missing.sentence.replace(" +- ", " \N{PLUS-MINUS SIGN} ").replace("(-", "(\N{MINUS SIGN}")
-    return f"{mark} {said}", f"verdict {tone}"
+    cost = "" if missing.worst is None else f" Wrong without it: {missing.worst.text}."
+    return f"{mark} {signs(missing.sentence + cost)}", f"verdict {tone}"
 
 
 def odds(missing: Missing) -> list[Any]:
     """List what may be missing, the likeliest first, each with its probability, its members in a tip; what is left."""
     told, left = missing.probabilities, missing.left
-    held = "" if missing.held_out is None else f"Held-out error of a result: {missing.held_out:.3f} sigma. "
+    held = "" if missing.held_out is None else f"Held-out error, as a report gives it: {missing.held_out:.3f} sigma. "
     rest = html.P(f"{held}Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof.")
     if told is None:
         return [rest]
@@ -74,7 +75,7 @@ def numbers(fitted: Fitted, given: Fitted) -> str:
     """Return how well a fit predicts, in one line."""
     fell = "" if fitted is given else f"{given.held_out:.3f} \N{RIGHTWARDS ARROW} "
     held = "" if fitted.at_held is None else f"; of what is left out {fitted.at_held:.3f}"
-    errors = f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}; 1 is right."
+    errors = f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}."
     return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
 
 
