@@ -9,13 +9,22 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.console import plain
-from sdimu_calibration.cli.diagnosis_text import CANDIDATE_HEADINGS, candidate_rows, print_summary, smallest, step_lines
+from sdimu_calibration.cli.diagnosis_text import (
+    CANDIDATE_HEADINGS,
+    candidate_rows,
+    print_summary,
+    smallest,
+    step_lines,
+    taken_for_granted,
+)
 from sdimu_calibration.cli.next_commands import Asked
+from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.held_out import HeldOut
 from sdimu_calibration.core.posterior.told import Share
+from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.cost import coefficients_off, wrong_without
 
 
@@ -73,3 +82,11 @@ def test_coefficients_are_wrong_by_what_a_calibration_delivers(summary, more):
     delivered = wrong_without(summary, replace(more, given=given))
     assert delivered == coefficients_off(given, summary.diagnosis.after)
     assert abs(delivered[0].sigmas) < abs(wrong_without(summary, replace(more, given=None))[0].sigmas)
+
+
+def test_what_is_taken_as_absent_is_told_with_what_it_would_do():
+    """ "No X (68 ug of it, Z is off by 154 sigma)" read as if X were there and Z were off."""
+    one = Assumed("accel_scale_z", "reference_gravity", "reference_gravity", to_si(68.1, "ug"), "m/s^2", "ug", 153.6)
+    assert taken_for_granted([one, replace(one, coefficient="accel_scale_x", sigmas=96.0)]) == (
+        "reference_gravity (68.1 ug would put accel_scale_z 154 sigma off)"
+    )

@@ -37,3 +37,12 @@ def test_a_model_that_lacks_nothing_is_not_said_to_fail():
 
 def test_nothing_is_said_where_no_fit_predicts():
     assert InUse(10.0, 1, NAMES[:1], (2500.0,)).words.endswith("seen: not compensated")
+
+
+def test_each_distance_stands_beside_its_compensation():
+    """A list of three numbers and a list of three names behind it had to be read twice."""
+    told = InUse(10.0, 2, NAMES, (2500.0, 105.0, 40.0), 27.0).sentence
+    assert told == (
+        "2.5 km (not compensated) -> 105 m (model as given) -> 40 m (with what was found): position after 10 min "
+        "without aid, over 2 stretches (root mean square) that no fit has seen; the last fit predicted 27 m"
+    )

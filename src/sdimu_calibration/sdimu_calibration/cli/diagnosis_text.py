@@ -72,7 +72,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, mor
 def cost_lines(summary: DiagnosisSummary, more: ReportExtras | None) -> list[str]:
     """Say what a missing effect costs: metres without aid, then the coefficients that are wrong without it."""
     use = in_use(more)
-    lines = [] if use is None else [f"{use.figures}: {use.words}"]
+    lines = [] if use is None else [use.sentence]
     off = wrong_without(summary, more)
     if off:
         rest = f" and {len(off) - _WORST} more" if len(off) > _WORST else ""
@@ -218,7 +218,10 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")
     if summary.assumed:
-        line(console, f"taken for granted by the coefficients: {taken_for_granted(summary.assumed)}")
+        line(
+            console,
+            f"this plan does not show, and the coefficients take as absent: {taken_for_granted(summary.assumed)}",
+        )
     if summary.reached:
         line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
 
@@ -229,8 +232,8 @@ def taken_for_granted(assumed: Sequence[Assumed]) -> str:
     for one in assumed:
         first.setdefault(one.family, one)
     told = [
-        f"no {one.label} ({amount(one.size, one.display_unit)} {one.display_unit} of it, {one.coefficient} is off by "
-        f"{one.sigmas:.0f} sigma)"
+        f"{one.label} ({amount(one.size, one.display_unit)} {one.display_unit} would put {one.coefficient} "
+        f"{one.sigmas:.0f} sigma off)"
         for one in first.values()
     ]
     return "; ".join(told[:_ASSUMED])

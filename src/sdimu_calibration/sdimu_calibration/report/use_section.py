@@ -41,7 +41,7 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     return section(
         heading,
         *(sentence(trial_sentence(trial)) for trial in report_extras.trials),
-        sentence(f"Together: {whole.figures}, {whole.words}.") if (whole := cost.in_use(report_extras)) else "",
+        sentence(f"Together: {whole.sentence}.") if (whole := cost.in_use(report_extras)) else "",
         draw(figure(report_extras.trials)),
         grid(_COLUMNS, rows, {0, 1}),
         quiet(

@@ -106,7 +106,7 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
 def _consistent(d: Diagnosis) -> str:
     if d.rungs and d.rungs[0].scatter is not None:
         left = beyond(d.rungs[0].scatter)
-        return f"No effect of the catalogue stands out of the scatter of this run; beyond white noise: {left}."
+        return f"No effect of the catalogue stands out of the scatter of this run. Scatter beyond white noise: {left}."
     odd = "; ".join(f.text for f in d.findings)
     told = d.probabilities
     if told is not None and told.nothing < PROBABLE:
@@ -127,7 +127,7 @@ def _unexplained(d: Diagnosis, names: str) -> str:
     if d.rungs and d.rungs[-1].scatter is not None:
         most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
-        return f"Something stands out of the scatter{most}; beyond white noise: {left}."
+        return f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}."
     drawn = [term_in_words(term) for term in d.found.noise]
     if any(term.kind in FOLLOWS for term in d.found.noise):
         begun = (
