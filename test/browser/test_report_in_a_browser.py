@@ -138,6 +138,22 @@ def test_the_imu_turns_with_the_slider(opened: Any) -> None:
     assert told.inner_text().startswith("stop 3")
 
 
+def test_the_words_of_the_imu_do_not_lie_on_each_other(opened: Any) -> None:
+    """At the first stop of the plan its axes are along north, east and down, or near it."""
+    opened.locator(".attitude").scroll_into_view_if_needed()
+    boxes = opened.evaluate(
+        "[...document.querySelectorAll('.attitude svg text')].filter(e => e.textContent)"
+        ".map(e => e.getBoundingClientRect()).map(b => [b.left, b.right, b.top, b.bottom])"
+    )
+    assert len(boxes) == 7
+    for k, (left, right, top, bottom) in enumerate(boxes):
+        for other in boxes[k + 1 :]:
+            across = min(right, other[1]) - max(left, other[0])
+            down = min(bottom, other[3]) - max(top, other[2])
+            # A box has a third of its height free above and below a letter.
+            assert across <= 0 or down <= (bottom - top) / 3
+
+
 def test_the_page_opens_quickly_and_is_small(browser: Any, report: Path) -> None:
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     page = context.new_page()

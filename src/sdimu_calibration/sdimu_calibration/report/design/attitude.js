@@ -2,7 +2,8 @@
 document.querySelectorAll('.attitude').forEach(function (place) {
   var data = JSON.parse(place.querySelector('script').textContent), svg = place.querySelector('svg');
   var slider = place.querySelector('input'), told = place.querySelector('output');
-  var view = {turn: -0.6, lift: 0.45}, NS = 'http://www.w3.org/2000/svg';
+  // What stands still reaches further than the axes: at a stop along north, east or down, words would lie on words.
+  var view = {turn: -0.6, lift: 0.45}, NS = 'http://www.w3.org/2000/svg', STILL = 1.15, REACH = 1.35;
 
   function seen(p) { // North, East, Down to the sheet: right, up, depth
     var e = p[1], n = p[0], u = -p[2], c = Math.cos(view.turn), s = Math.sin(view.turn);
@@ -31,7 +32,7 @@ document.querySelectorAll('.attitude').forEach(function (place) {
     while (svg.lastChild && svg.lastChild.nodeName !== 'defs') { svg.removeChild(svg.lastChild); }
     for (j = 0; j < 40; j += 1) { ring.push([Math.cos(j * Math.PI / 20), Math.sin(j * Math.PI / 20), 0]); }
     polygon(ring, {fill: 'var(--sunken)', stroke: 'var(--line)'});
-    [['N', [1.12, 0, 0]], ['E', [0, 1.12, 0]]].forEach(function (mark) {
+    [['N', [REACH, 0, 0]], ['E', [0, REACH, 0]]].forEach(function (mark) {
       var p = at(mark[1]); add('text', {x: p[0], y: p[1], fill: 'var(--muted)'}, data.arbitrary ? '' : mark[0]);
     });
     var faces = [];
@@ -48,9 +49,9 @@ document.querySelectorAll('.attitude').forEach(function (place) {
     faces.sort(function (a, b) { return b[0] - a[0]; }).forEach(function (face) {
       polygon(face[1], {fill: 'var(--card)', 'fill-opacity': 0.8, stroke: 'var(--muted)'});
     });
-    arrow([0, 0, 0.95], 'muted', 'g', '5 3');
+    arrow([0, 0, STILL], 'muted', 'g', '5 3');
     if (data.latitude !== null) {
-      arrow([0.95 * Math.cos(data.latitude), 0, -0.95 * Math.sin(data.latitude)], 'doubtful', '\u03a9', '2 3');
+      arrow([STILL * Math.cos(data.latitude), 0, -STILL * Math.sin(data.latitude)], 'doubtful', '\u03a9', '2 3');
     }
     ['x', 'y', 'z'].forEach(function (axis, i) {
       arrow(scaled(C, [0, 1, 2].map(function (n) { return n === i ? 0.9 : 0; })), axis, axis);
