@@ -83,6 +83,8 @@ class Kind(StrEnum):
     """Label, and what no plan tells it from."""
     RECORD_ONCE_MORE = auto()
     """Label; what looks the same; turns in words."""
+    NO_TURN_TELLS = auto()
+    """Label; what looks the same; significance of the best turn, and that which tells (sigma)."""
     ONE_BY_ONE = auto()
 
     # About a fit.

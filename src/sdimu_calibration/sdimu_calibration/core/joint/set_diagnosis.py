@@ -52,6 +52,8 @@ reach it: 1 is right."""
 _SHARED = 10.0
 """Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
 its size cost less."""
+_TELLS = 3.0
+"""Significance (sigma) from which effects are told apart: a turn that reaches less is no advice."""
 _LISTED = 4
 """Number of effects that a sentence names: the table has the rest."""
 
@@ -412,7 +414,10 @@ def _advice(
         elif f.alike and f.label not in closed:
             out.append(Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0])))
     for (label, *others), turn in closing:
-        out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
+        if turn.after < _TELLS:
+            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, _TELLS), Verb.CONTINUE))
+        else:
+            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
     if word == Verdict.UNEXPLAINED:
         out.append(Advice(Kind.ONE_BY_ONE))
     return tuple(out)

@@ -173,6 +173,10 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"to tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}; for a "
         "whole plan"
     ),
+    Kind.NO_TURN_TELLS: lambda label, others, best, tells: (
+        f"no single turn tells {label} from {', '.join(others)} ({best:.1f} sigma with the best one, {tells:.0f} tell)"
+        ": search a whole plan for the next recording"
+    ),
     Kind.ONE_BY_ONE: lambda: (
         "diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first"
     ),

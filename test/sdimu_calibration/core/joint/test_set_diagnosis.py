@@ -1,0 +1,28 @@
+"""What a set advises to record next: a turn where one tells, else a whole plan."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from sdimu_calibration.core.joint.set_diagnosis import _advice
+from sdimu_calibration.core.plan import Turn
+from sdimu_calibration.core.plan_search import NextTurn
+from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.storage.files.advice_words import sentence
+
+
+@pytest.mark.parametrize(
+    ("after", "begins"),
+    [
+        (1.6, "no single turn tells a from b (1.6 sigma with the best one, 3 tell): search a whole plan"),
+        (4.0, "to tell a from b, record once more: rests of 100 s, and between them turn X +180 deg at 10 deg/s"),
+    ],
+    ids=["too little", "enough"],
+)
+def test_a_turn_is_advised_where_it_tells(after, begins):
+    turn = NextTurn((Turn("X", math.pi, math.radians(10.0)),), 2.0, 1.5, after)
+    (told,) = _advice(Verdict.ONE_EFFECT, (), [(("a", "b"), turn)], ())
+    assert sentence(told).startswith(begins)
+    assert sentence(told).endswith(": sdimu plan --after")
