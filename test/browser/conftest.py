@@ -154,18 +154,28 @@ def broken_rules(page: Any) -> list[str]:
 
 _CROSSING = """() => Array.from(document.querySelectorAll('.js-plotly-plot')).flatMap(figure => {
     const upright = e => !/rotate\\((?!-90|0)/.test(e.getAttribute('transform') || '');
-    const words = Array.from(figure.querySelectorAll('[class$="tick"] text, [class*="-"] > text[class$="title"]'))
-        .filter(e => e.textContent.trim() && upright(e)).map(e => [e.textContent, e.getBoundingClientRect()]);
+    const boxes = places => Array.from(figure.querySelectorAll(places)).filter(e => e.textContent.trim() && upright(e))
+        .map(e => [e.textContent, e.getBoundingClientRect()]);
     const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
         && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 4;
-    return words.flatMap(([one, box], k) => words.slice(k + 1).filter(([, other]) => over(box, other))
-        .map(([other]) => `${figure.id}: ${one} / ${other}`));
+    const told = (one, others) => others.filter(([, box]) => over(one[1], box))
+        .map(([other]) => `${figure.id}: ${one[0]} / ${other}`);
+    const layout = figure._fullLayout, at = figure.getBoundingClientRect();
+    const axes = Object.keys(layout).filter(key => /^xaxis\\d*$/.test(key) && layout[key].visible);
+    const panels = axes.map(key => {
+        const x = layout[key], y = layout[key.replace('x', 'y')];
+        const left = at.left + x._offset, top = at.top + y._offset;
+        return [`panel ${key}`, {left, right: left + x._length, top, bottom: top + y._length}];
+    });
+    const words = boxes('[class$="tick"] text, [class*="-"] > text[class$="title"]');
+    return boxes('[class*="g-y"] > text').flatMap(one => told(one, panels))
+        .concat(words.flatMap((one, k) => told(one, words.slice(k + 1))));
 })"""
-"""Labels of a figure that lie upon each other by more than the room that a font leaves around a word."""
+"""Labels of a figure that lie upon each other by more than the room that a font leaves around a word, or in a panel."""
 
 
 def crossing_labels(page: Any) -> list[str]:
-    """Name the labels of axes that cross another one of their figure."""
+    """Name the labels of axes that cross another one of their figure, or a panel."""
     found: list[str] = page.evaluate(_CROSSING)
     return found
 

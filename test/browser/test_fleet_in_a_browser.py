@@ -10,6 +10,8 @@ import pytest
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.cli.fleet import fleet
 
+from .conftest import crossing_labels
+
 SHEET_PX = 703
 """Width of A4 less the margins of the pages (186 mm) at 96 dots an inch."""
 
@@ -45,6 +47,16 @@ def test_the_fleet_draws_and_sorts_by_the_heading_that_is_clicked(batch, opened)
     heading.click()
     assert shown() == rising[::-1]
     assert opened.faults == []
+
+
+def test_no_label_of_a_narrow_page_crosses_another(batch, opened):
+    folder = batch(units=6)
+    fleet([folder])
+    opened.set_viewport_size({"width": 800, "height": 1000})
+    opened.goto(f"file://{folder / 'fleet.html'}")
+    opened.evaluate("sdimuDrawAll()")
+    assert opened.locator(".js-plotly-plot").count() >= 5
+    assert crossing_labels(opened) == []
 
 
 def test_the_certificate_prints_on_a4_and_nothing_is_cut(batch, opened):

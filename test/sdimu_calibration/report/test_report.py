@@ -28,6 +28,7 @@ from sdimu_calibration.report import (
     use_section,
 )
 from sdimu_calibration.report.coefficients import as_csv, as_yaml
+from sdimu_calibration.report.evidence_figures import heat_maps
 from sdimu_calibration.report.markup import prose, section
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
@@ -229,3 +230,9 @@ def test_what_looks_the_same_shares_the_bar_of_what_was_found(diagnosis):
     assert other not in folded["y"]
     (words,) = (text for text in folded["customdata"] if "82 %" in text)
     assert words.endswith(f", 82 %; or {other} 18 %")
+
+
+def test_a_map_of_rests_does_not_call_them_stops():
+    figure = heat_maps([data.Grid(np.arange(3), np.zeros((1, 3)))], ["gyro_x"], "rest")
+    assert figure.layout["xaxis"]["title"]["text"] == "rest"
+    assert "at rest %{x}" in figure.data[0]["hovertemplate"]

@@ -40,7 +40,7 @@ def export(
     effect: OwnEffectOption = None,
     replace: Annotated[bool, typer.Option("--replace", help="Replace a file that is already there.")] = False,
 ) -> None:
-    """Write a result for another program: matrices, files of Kalibr, OpenVINS, GTSAM, imu_tk, PX4, C, YAML or CSV.
+    """Write a result for another program: matrices, Kalibr, OpenVINS, GTSAM, imu_tk, PX4, ArduPilot, C, YAML or CSV.
 
     A result that is not to be trusted is written all the same; stderr says why it is not.
     """

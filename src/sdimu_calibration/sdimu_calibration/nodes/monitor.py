@@ -38,7 +38,7 @@ class Monitor:
     start_ns : int, optional
         Stamp of the begin of the test; without it that of the first status that is heard.
     first : mapping of str to float, optional
-        Sigma (SI) by coefficient at the begin of the test; without it the first that is published.
+        Sigma (SI) by coefficient at the start of the test; without it the first that is published.
     """
 
     def __init__(self, start_ns: int | None = None, first: Mapping[str, float] | None = None) -> None:

@@ -25,16 +25,18 @@ _ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
 _LIMIT = {"dash": "dash", "color": INK, "width": 1.5}
 
 
-def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> Figure:
-    """Normalised residual means, channel by stop: number and sign in each cell, colour besides."""
-    return deviates([str(s) for s in grid.stops], channels, grid.value, "stop", "channel", 440)
+def heat_map(grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES, place: str = "stop") -> Figure:
+    """Normalised residual means, channel by stop or another `place`: number and sign in each cell, colour besides."""
+    return deviates([str(s) for s in grid.stops], channels, grid.value, place, "channel", 440)
 
 
-def heat_maps(grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, height: int = 330) -> Figure:
+def heat_maps(
+    grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, place: str = "stop", height: int = 330
+) -> Figure:
     """Draw heat maps of several models with one scale of colours upon each other; a switch of the page shows one."""
-    figure = heat_map(grids[0], channels)
+    figure = heat_map(grids[0], channels, place)
     for grid in grids[1:]:
-        other = heat_map(grid, channels).data[0]
+        other = heat_map(grid, channels, place).data[0]
         figure.data.append({**other, "visible": False})
     return lay_out(figure, height, margin={"l": 95, "r": 10, "t": 12, "b": 45})
 

@@ -98,7 +98,7 @@ def heat_maps(summary: DiagnosisSummary, draw: Draw) -> str:
     found = [data.places(d.consistency.where)]
     if len(d.found.chosen):
         found.append(data.places(places(d.evidence, d.found.chosen)))
-    figure = evidence_figures.heat_maps([grid for grid, _ in found], found[0][1])
+    figure = evidence_figures.heat_maps([grid for grid, _ in found], found[0][1], "rest")
     return (
         '<section class="card"><h2>Where it fails: channel by rest</h2>'
         + switched(draw(figure), ("model as given", "with what was found")[: len(found)])

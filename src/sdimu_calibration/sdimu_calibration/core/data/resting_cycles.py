@@ -22,7 +22,7 @@ from sdimu_calibration.core.navigation.strapdown import Cycles, velocity_increme
 from sdimu_calibration.core.rotation import rotation_vector
 
 _AFTER_TURN = 10
-"""Number of epochs at the begin of a stop whose cycles stay: what settles after a turn changes within a second."""
+"""Number of epochs at the start of a stop whose cycles stay: what settles after a turn changes within a second."""
 
 
 def standing(phases: Phases) -> Bools:

@@ -116,7 +116,9 @@ def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[s
     for k, one in enumerate(some):
         place = {"row": 1 + k // _PANELS, "col": 1 + k % _PANELS}
         _panel(figure, fleet, one, units[one.name], x, place)
-        figure.y_axes(title=units[one.name], standoff=4, **place)
+        # Panels of a row have one unit, but where an effect has several.
+        if place["col"] == 1 or units[one.name] != units[some[0].name]:
+            figure.y_axes(title=units[one.name], standoff=4, **place)
     for k in range(len(some), rows * _PANELS):
         figure.x_axes(visible=False, row=1 + k // _PANELS, col=1 + k % _PANELS)
         figure.y_axes(visible=False, row=1 + k // _PANELS, col=1 + k % _PANELS)

@@ -174,7 +174,7 @@ def _line(line: Line, triad: str, judged: bool) -> str:
         (unit, "text number"),
         (rms, "number"),
         (number, "number"),
-        *([(limit, "number"), (verdict, verdict.split(" ")[0])] if judged else []),
+        *([(limit, "number"), (verdict, f"text {verdict.split(' ')[0]}")] if judged else []),
         (how, "text quiet"),
     ]
     return "<tr>" + "".join(f'<td class="{kind}">{escape(text)}</td>' for text, kind in texts) + "</tr>"

@@ -124,7 +124,7 @@ def joined(view: LiveView) -> str:
     """Say from when the sigmas are drawn, where that is not the begin."""
     if view.joined_s < _LATE_S:
         return ""
-    return f"Watched from {view.joined_s / 60.0:.1f} min on; shares are of the sigmas at the begin of the test."
+    return f"Watched from {view.joined_s / 60.0:.1f} min on; shares are of the sigmas at the start of the test."
 
 
 def largest(view: LiveView) -> str:

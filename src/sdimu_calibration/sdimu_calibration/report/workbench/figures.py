@@ -16,7 +16,7 @@ from sdimu_calibration.report.workbench.axes import TIME
 from sdimu_calibration.report.workbench.fit import Fitted
 
 _FONT = 13
-HEIGHT = 306
+HEIGHT = 297
 """Height of a figure (px): two rows of them and the bar fit on a screen of 900."""
 _CELL = 10
 """Size of the numbers in the cells (px): with it those of 19 stops stand beside each other."""
