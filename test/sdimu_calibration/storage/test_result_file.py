@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.storage.files.config import load_imu
-from sdimu_calibration.storage.files.result_file import read_result, write_result
+from sdimu_calibration.storage.files.result_file import read_judged_result, read_result, write_result
 
 
 def calibration() -> Calibration:
@@ -146,3 +146,50 @@ def test_what_is_wrong_in_a_result_is_told_with_its_key(tmp_path, key, told):
     (tmp_path / "result.json").write_text(json.dumps(content))
     with pytest.raises(DataError, match=rf"result\.json: not a complete sdimu-result/1 file \({told}"):
         read_result(tmp_path)
+
+
+def _damaged(tmp_path, key, value):
+    """Write a result with one entry replaced."""
+    write_result(tmp_path / "result.json", calibration())
+    content = json.loads((tmp_path / "result.json").read_text())
+    place = content
+    for part in key[:-1]:
+        place = place[part]
+    place[key[-1]] = value
+    (tmp_path / "result.json").write_text(json.dumps(content))
+    return tmp_path / "result.json"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        (("coefficients", 1, "value"), True, "coefficients.1.value: "),
+        (("coefficients", 1, "value"), "0.1", "coefficients.1.value: "),
+        (("coefficients", 1, "unit"), "deg/h", "coefficients.1.unit: 'deg/h', expected 'rad/s'"),
+        (("coefficients", 1, "unit"), "parsec", "coefficients.1.unit: 'parsec', expected"),
+        (("coefficients", 1, "display_unit"), "ug", "coefficients.1.display_unit: 'ug' is no unit of what is in"),
+        (("coefficients", 1, "display_unit"), "furlong", "unknown unit 'furlong'"),
+        (("coefficients", 1, "name"), "gyro_bias_x", "coefficients.1.name: 'gyro_bias_x' is there twice"),
+        (("covariance", 1), ["1", "2", "3"], "covariance: a list of numbers"),
+        (("covariance", 1), [None, "2", "3"], "covariance: a list of numbers"),
+        (("covariance", 1), [1.0], "covariance: a list of numbers"),
+        (("covariance", 0, 0), -1.0, "covariance: a variance is below zero"),
+        (("covariance", 0, 1), 1e3, "covariance: is not symmetric"),
+        (("covariance",), [[1.0] * 3, [1.0, 1e-3, 1.0], [1.0] * 3], "covariance: a correlation is beyond 1"),
+        (("history", "dwell"), [2] * 7, "history.dwell: a list of numbers"),
+        (("fit", "held_out_rms"), [1, 2], "fit.held_out_rms."),
+        (("fit", "held_out_rms"), "loud", "fit.held_out_rms."),
+    ],
+)
+def test_numbers_that_are_none_and_units_that_are_not_taken_are_refused(tmp_path, key, value, told):
+    with pytest.raises(DataError, match=r"result\.json: not a complete sdimu-result/1 file") as error:
+        read_result(_damaged(tmp_path, key, value))
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize("key", [("coefficients", 1, "value"), ("covariance", 1, 1)])
+def test_a_value_that_is_no_number_is_read_but_not_used(tmp_path, key):
+    path = _damaged(tmp_path, key, None)
+    assert read_result(path).names[1] == "gyro_bias_y"
+    with pytest.raises(DataError, match=r"result\.json: gyro_bias_y: its value or variance is no number"):
+        read_judged_result(path)

@@ -9,12 +9,22 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictFloat,
+    StrictInt,
+    model_serializer,
+)
 
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic, without_advice
 from sdimu_calibration.core.origin import Origin
-from sdimu_calibration.core.recording import DataFault
+from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import (
     INSEPARABLE,
     NOT_TRUSTED,
@@ -31,6 +41,7 @@ from sdimu_calibration.core.results import (
 )
 from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import config_folder, load_imu
 from sdimu_calibration.storage.files.json_file import entry
@@ -52,6 +63,8 @@ _ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
 """How a line of a file ends that advises a diagnosis."""
 _TOPICS = {NOT_TRUSTED: Topic.NOT_TRUSTED, INSEPARABLE: Topic.INSEPARABLE}
 """What a line of a file is about, by its words."""
+_SLACK_OF_CORRELATION = 1e-3
+"""Share of the product of two sigmas (1) by which rounding may move a covariance: far below a digit that is wrong."""
 _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
 
@@ -131,7 +144,7 @@ class ResultFile(ResultModel):
     model: tuple[Word, ...]
     coefficients: tuple[Coefficient, ...]
     covariance: Array
-    fit: dict[str, Any]
+    fit: dict[str, StrictInt | StrictFloat | None]
     data: Data
     references: tuple[Annotated[Reference, Entry()], ...] = ()
     noise: tuple[Annotated[NoiseTerm, Entry({"unit": lambda term: term.unit})], ...] = ()
@@ -204,7 +217,7 @@ def _of_set(of_set: SetSummary) -> dict[str, Any]:
 
 def read_result(path: Path) -> Calibration:
     """Read result.json, or the result.json in a folder."""
-    return read_judged_result(path)[0]
+    return _read(path)[1]
 
 
 def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
@@ -220,22 +233,38 @@ def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
     result : Calibration
     reasons : tuple of str
         One line each; empty where nothing speaks against it.
+
+    Raises
+    ------
+    DataError
+        Where a value or a variance is no finite number: nothing can be corrected with it.
     """
-    path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
-    file = read_model(path, ResultFile)
-    with complete(path, FORMAT):
-        result = _calibration(file)
+    path, result, verdict = _read(path)
+    for name, value, variance in zip(result.names, result.values, np.diag(result.covariance), strict=True):
+        if not np.isfinite(value + variance):
+            raise DataError(f"{path}: {name}: its value or variance is no number; calibrate again")
     judged = (
-        [f"its diagnosis ended as '{file.verdict}': the model is wrong or the data are, and no effect mends it"]
-        if file.verdict in UNTRUSTED_VERDICTS
+        [f"its diagnosis ended as '{verdict}': the model is wrong or the data are, and no effect mends it"]
+        if verdict in UNTRUSTED_VERDICTS
         else []
     )
     reasons = dict.fromkeys([*judged, *result.not_to_be_trusted, *result.misfits])
     return result, tuple(f"{path}: {line}" for line in reasons)
 
 
+def _read(path: Path) -> tuple[Path, Calibration, str]:
+    """Path of the file itself, what it holds, and its verdict."""
+    path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
+    file = read_model(path, ResultFile)
+    with complete(path, FORMAT):
+        return path, _calibration(file), file.verdict
+
+
 def _calibration(file: ResultFile) -> Calibration:
     coefficients, p = file.coefficients, len(file.coefficients)
+    covariance = file.covariance.reshape(p, p)
+    _check_units(file)
+    _check_covariance(covariance)
     conditional = all("conditional_sigma" in c.model_fields_set for c in coefficients)
     return Calibration(
         **entry(file, "body_frame model fit estimator estimator_reason noise rests origin references drift_means"),
@@ -243,7 +272,7 @@ def _calibration(file: ResultFile) -> Calibration:
         units=tuple(c.unit for c in coefficients),
         display_units=tuple(c.display_unit if "display_unit" in c.model_fields_set else c.unit for c in coefficients),
         values=np.array([c.value for c in coefficients], float),
-        covariance=file.covariance.reshape(p, p),
+        covariance=covariance,
         data=file.data.model_extra or {},
         notes=tuple(map(as_note, file.notes)),
         history=no_history(p) if file.history is None else _whole_history(file.history, p),
@@ -253,6 +282,37 @@ def _calibration(file: ResultFile) -> Calibration:
         imu_noise=None if file.imu_noise is None else file.imu_noise.specification,
         of_set=_set_summary(file, p) if file.recordings else None,
     )
+
+
+def _check_units(file: ResultFile) -> None:
+    """Refuse a coefficient that is there twice, or in a unit that its value would not be taken in."""
+    effects = (registry.find(name) for name in file.model)
+    catalogue = {one.name: one.unit for effect in effects if effect for one in effect.parameters}
+    seen = set()
+    for number, one in enumerate(file.coefficients):
+        key = f"coefficients.{number}"
+        if one.name in seen:
+            raise ValueError(f"{key}.name: '{one.name}' is there twice")
+        seen.add(one.name)
+        if one.unit != catalogue.get(one.name, one.unit):
+            raise ValueError(f"{key}.unit: '{one.unit}', expected '{catalogue[one.name]}' (values are in SI)")
+        if parse_unit(one.display_unit or one.unit).dimension != parse_unit(one.unit).dimension:
+            raise ValueError(f"{key}.display_unit: '{one.display_unit}' is no unit of what is in '{one.unit}'")
+
+
+def _check_covariance(covariance: Floats) -> None:
+    """Refuse numbers that are no covariance; those that are missing (NaN) pass."""
+    variance = np.diag(covariance)
+    if (variance < 0.0).any():
+        raise ValueError("covariance: a variance is below zero")
+    # Products of sigmas, not of variances, which may be larger than any number.
+    sigma = np.sqrt(variance)
+    off = _SLACK_OF_CORRELATION * np.outer(sigma, sigma)
+    known = off > 0.0
+    if (np.abs(covariance - covariance.T) > off)[known].any():
+        raise ValueError("covariance: is not symmetric")
+    if (np.abs(covariance) > np.outer(sigma, sigma) + off)[known].any():
+        raise ValueError("covariance: a correlation is beyond 1")
 
 
 def _whole_history(history: History, p: int) -> History:

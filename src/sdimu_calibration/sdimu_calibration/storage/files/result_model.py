@@ -17,6 +17,7 @@ from pydantic import (
     ConfigDict,
     GetCoreSchemaHandler,
     PlainValidator,
+    Strict,
     ValidationError,
     create_model,
 )
@@ -80,16 +81,21 @@ def _or(default: Any, value: Any) -> Any:
 
 def _array(dtype: Any, value: Any) -> NDArray[Any]:
     try:
-        found = np.array(value, dtype)
-    except (TypeError, OverflowError) as error:
-        raise ValueError("a list of numbers is expected") from error
-    if not found.ndim:
-        raise ValueError("a list of numbers is expected")
+        given = np.array(value)
+        found = given.astype(dtype)
+    except (TypeError, OverflowError, ValueError) as error:
+        raise ValueError(_NO_NUMBERS) from error
+    # numpy would take text and truth values for numbers.
+    mixed = given.dtype.kind == "O" and any(isinstance(one, str | bool) for one in given.flat)
+    truth = given.dtype.kind == "b", found.dtype.kind == "b"
+    if not given.ndim or mixed or given.dtype.kind in "US" or (given.size and truth[0] != truth[1]):
+        raise ValueError(_NO_NUMBERS)
     return found
 
 
-Number = Annotated[float, BeforeValidator(partial(_or, _NAN))]
-"""``null`` is NaN."""
+_NO_NUMBERS = "a list of numbers is expected, rows of equal length"
+Number = Annotated[float, Strict(), BeforeValidator(partial(_or, _NAN))]
+"""A number, and no text that looks like one; ``null`` is NaN."""
 Line = Annotated[str, BeforeValidator(lambda value: one_line(str(value)))]
 Said = Annotated[str, BeforeValidator(lambda value: one_line(str(value), None))]
 """What is told to people, however long."""
@@ -143,4 +149,5 @@ def _field(hint: Any, default: Any) -> tuple[Any, Any]:
         parts = tuple(part if part is ... else _field(part, MISSING)[0] for part in get_args(hint))
         hint = tuple[parts]  # type: ignore[valid-type]
     empty = default if default is not MISSING else _NAN if hint is float else None
+    hint = Annotated[float, Strict()] if hint is float else hint  # type: ignore[assignment]
     return Annotated[hint, BeforeValidator(partial(_or, empty))], ... if default is MISSING else default
