@@ -95,6 +95,32 @@ def test_results_go_into_no_folder_where_they_would_replace_a_file_of_the_user(s
     assert (tmp_path / name).read_text() == "# by hand\n"
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "calibrate BAG --out small",
+        "calibrate BAG --out inner/link",
+        "calibrate BAG BAG --out small",
+        "diagnose BAG --out small",
+        "noise BAG --out small",
+        "replay BAG --out small",
+        "pictures BAG --out small",
+        "predict --out small",
+        "run --out small",
+        "datasheet BATCH --out small",
+        "fleet BATCH --out small",
+    ],
+)
+def test_no_results_are_written_into_a_recording(said, tmp_path, line):
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "link").symlink_to(tmp_path / "small")
+    before = sorted((tmp_path / "small").iterdir())
+    status, err = said(line)
+    assert (status, err.count("\n")) == (1, 1)
+    assert "is a recording; choose another folder for the results" in err
+    assert sorted((tmp_path / "small").iterdir()) == before
+
+
 def test_files_among_keys_of_effects_are_found():
     assert effect_files(["gyro_bias", "mine.yaml:k", "a/b.yaml", "gyro_x: ey^2"]) == [
         Path("mine.yaml"),

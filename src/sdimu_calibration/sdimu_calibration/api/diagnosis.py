@@ -24,6 +24,7 @@ from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.unknown_section import unknown_of
+from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -108,7 +109,7 @@ class FitDiagnosis(Diagnosed):
 
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
-        folder = Path(folder)
+        folder = results_folder(folder)
         with written_together(folder) as part:
             write_diagnosis(part / "diagnosis.json", self.summary)
             write_result(part / "result.json", self.core.after, self.core.verdict)

@@ -19,6 +19,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.effect_file import find_effects, new_parts
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -109,7 +110,7 @@ class CalibrationFit(Fitted):
 
     def save(self, folder: str | Path) -> Path:
         """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
-        folder = Path(folder)
+        folder = results_folder(folder)
         with written_together(folder) as part:
             write_result(part / "result.json", self.result)
             write_report(part / "report.html", self.result, title="Calibration", fit=self.core, trace=traced())

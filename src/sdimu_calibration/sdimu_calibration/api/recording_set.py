@@ -21,6 +21,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, SetSummary
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
@@ -115,7 +116,7 @@ class JointFit(Fitted):
 
     def save(self, folder: str | Path) -> Path:
         """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
-        folder = Path(folder)
+        folder = results_folder(folder)
         with written_together(folder) as part:
             write_result(part / "result.json", self.result)
             write_report(part / "report.html", self.result, title=f"Calibration of {len(self.of)} recordings")
@@ -170,7 +171,7 @@ class JointDiagnosis(Diagnosed):
 
     def save(self, folder: str | Path) -> Path:
         """Write set.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
-        folder = Path(folder)
+        folder = results_folder(folder)
         title = f"Diagnosis of {len(self.of)} recordings"
         with written_together(folder) as part:
             write_set_diagnosis(part / "set.json", self.core)

@@ -58,8 +58,18 @@ JsonOption = Annotated[
 
 def results_in(default: str) -> OptionInfo:
     """Declare ``--out`` of a verb that leaves several files."""
-    option: OptionInfo = typer.Option(file_okay=False, help=f"Folder of the {default} by default.")
+    text = f"Folder of the {default} by default."
+    option: OptionInfo = typer.Option(file_okay=False, callback=outside_recordings, help=text)
     return option
+
+
+def outside_recordings(folder: Path | None) -> Path | None:
+    """Return the folder of ``--out``, before any work is done; a recording is refused."""
+    if folder is None:
+        return None
+    from sdimu_calibration.storage.bags.file_room import results_folder
+
+    return results_folder(folder)
 
 
 def _read(metavar: str, text: str) -> OptionInfo:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
-from sdimu_calibration.cli.options import ImuNameOption, JsonOption, ModelOption
+from sdimu_calibration.cli.options import ImuNameOption, JsonOption, ModelOption, outside_recordings
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -32,7 +32,9 @@ def predict(
     model: ModelOption = "baseline",
     mount: Annotated[str | None, typer.Option(metavar="DEG", help=_MOUNT)] = None,
     noise: Annotated[str | None, typer.Option(help=_NOISE)] = None,
-    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/predict"),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, callback=outside_recordings, help="Folder of the results.")
+    ] = Path("out/predict"),
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the covariance of a test; leaves prediction.json and prediction.html."""

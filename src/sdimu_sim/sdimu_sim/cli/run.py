@@ -24,7 +24,7 @@ from sdimu_calibration.cli.next_commands import (
 )
 from sdimu_calibration.cli.opened import NOT_TRUSTED, leave
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place
+from sdimu_calibration.cli.options import DomainOption, EachStopOption, Fitted, Place, outside_recordings
 from sdimu_calibration.cli.serving import LivePage, PageOptions, ended
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import put_aside, same_file, written_together
@@ -82,7 +82,9 @@ def run(
     world: World,
     page: PageOptions,
     domain: DomainOption = None,
-    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path("out/run"),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, callback=outside_recordings, help="Folder of the results.")
+    ] = Path("out/run"),
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite an earlier run in that folder.")] = False,
 ) -> None:
     """Run a whole simulated test over ROS 2: table, IMU, calibration and recorder, each its own process.

@@ -49,6 +49,14 @@ def check_no_source(path: Path, option: str, sources: Iterable[Path] = ()) -> No
         raise DataError(f"{path}: is a device or a pipe; name a file to write with {option}")
 
 
+def results_folder(folder: str | Path) -> Path:
+    """Return a folder of results; a recording is refused: what is in its folder is taken for a part of it."""
+    folder = Path(folder)
+    if (folder / METADATA).is_file():
+        raise DataError(f"{folder}: is a recording; choose another folder for the results (--out)")
+    return folder
+
+
 def check_own_file(path: Path, heads: tuple[str, ...], sources: Iterable[Path] = ()) -> None:
     """Raise DataError unless a file with a fixed name can be made in a folder of results.
 
