@@ -93,6 +93,7 @@ def simulate(
         place, sensor = load_site(world.site), load_imu(imu or "mems_by_hand")
         run = ByHand(by_hand, sensor, place, drawn.seed, world.rate, effects=world.effects)
         _by_hand(run, out, truth_path, kept)
+        _tell_twins(world.effects)
         return
     scenario = world.scenario(
         plan,
@@ -107,6 +108,19 @@ def simulate(
     write_truth(truth_path, test.truth)
     count = len(test.samples.t)
     plain().print(f"{out}: {count} samples, {test.motion.t[-1]:.0f} s; truth in {truth_path}", soft_wrap=True)
+    _tell_twins(world.effects)
+
+
+def _tell_twins(effects: Sequence[str]) -> None:
+    """Say which hidden effects are a coefficient that the sensor has already."""
+    from sdimu_sim.core.hidden import parse_effects
+    from sdimu_sim.core.true_coefficients import one_coefficient
+
+    for other, name in one_coefficient(parse_effects(effects).sizes):
+        plain().print(
+            f"{other} is {name} by another name: no test tells them apart, the truth has their sum under both names",
+            soft_wrap=True,
+        )
 
 
 def _refuse_by_hand(drawn: Drawn) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_sim.core.hidden import parse_effects
 from sdimu_sim.core.truth import (
+    UNBALANCE,
     ImuTruth,
     elements,
     in_body_frame,
@@ -28,6 +29,11 @@ _SPAN_K = np.linspace(-50.0, 50.0, 11)
 _STEP_K = 0.01
 """Step of central differences (K): the third power of the temperature leaves a share of 1e-7."""
 _TRIADS = ("gyro", "accel")
+_TWINS = {
+    f"gyro_mass_unbalance_{part}": f"gyro_g_sensitivity_{'xyz'[gyro]}{'xyz'[force]}"
+    for part, (gyro, force) in UNBALANCE.items()
+}
+"""The other name of each mass unbalance: the same place of the matrix that multiplies the force."""
 
 
 def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
@@ -48,10 +54,26 @@ def true_coefficients(truth: ImuTruth, frame: str) -> dict[str, float]:
         The thirty coefficients and the size of every named effect, SI.
     """
     sizes = dict(parse_effects(truth.effects).sizes)
-    out = in_body_frame(truth.coefficients, frame) | sizes
+    coefficients = dict(truth.coefficients)
+    for other, name in one_coefficient(sizes):
+        coefficients[name] = coefficients.get(name, 0.0) + sizes[other]
+    out = in_body_frame(coefficients, frame) | sizes
     if frame != "prior" and any(name.startswith("accel_misalignment_temperature") for name in sizes):
-        out |= _turned(truth.coefficients, sizes)
-    return out
+        out |= _turned(coefficients, sizes)
+    return out | {other: out[name] for other, name in one_coefficient(sizes)}
+
+
+def one_coefficient(names: Iterable[str]) -> list[tuple[str, str]]:
+    """Find the hidden effects that are a mass unbalance by another name: the same force in the same gyro.
+
+    A test shows their sum, which is the true value under either name.
+
+    Returns
+    -------
+    list of (str, str)
+        The g-sensitivity and the mass unbalance of each such pair.
+    """
+    return [(_TWINS[name], name) for name in _TWINS if _TWINS[name] in set(names)]
 
 
 def _turned(coefficients: Mapping[str, float], sizes: Mapping[str, float]) -> dict[str, float]:

@@ -15,14 +15,14 @@ from sdimu_calibration.core.specification import ImuSpecification, Site
 
 _XYZ = "xyz"
 _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
-_UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 2), "qz": (2, 1)}
+UNBALANCE = {"dx": (0, 0), "qx": (0, 1), "dy": (1, 1), "qy": (1, 0), "dz": (2, 2), "qz": (2, 1)}
 """Place of each mass unbalance in the matrix that multiplies a = f/g."""
 
 _GROUPS: dict[str, tuple[str, ...]] = {
     "gyro_bias": tuple(_XYZ),
     "gyro_scale": tuple(_XYZ),
     "gyro_misalignment": _PAIRS,
-    "gyro_mass_unbalance": tuple(_UNBALANCE),
+    "gyro_mass_unbalance": tuple(UNBALANCE),
     "accel_bias": tuple(_XYZ),
     "accel_scale": tuple(_XYZ),
     "accel_misalignment": _PAIRS,
@@ -183,7 +183,7 @@ def with_longer_axes(coefficients: Mapping[str, float], share: float) -> dict[st
 def unbalance_matrix(coefficients: Mapping[str, float]) -> Floats:
     """Mass unbalance as a matrix, shape (3, 3): gyro error = result @ (f / g) (rad/s per g)."""
     matrix = np.zeros((3, 3))
-    for part, place in _UNBALANCE.items():
+    for part, place in UNBALANCE.items():
         matrix[place] = coefficients.get(f"gyro_mass_unbalance_{part}", 0.0)
     return matrix
 
@@ -230,7 +230,7 @@ def in_body_frame(coefficients: Mapping[str, float], frame: str) -> dict[str, fl
 
 def unbalance_elements(matrix: Floats) -> dict[str, float]:
     """Mass unbalance by name of its matrix (3, 3); what a turn moves outside the six terms is left out."""
-    return {f"gyro_mass_unbalance_{part}": float(matrix[place]) for part, place in _UNBALANCE.items()}
+    return {f"gyro_mass_unbalance_{part}": float(matrix[place]) for part, place in UNBALANCE.items()}
 
 
 def triad_rotation(M: Floats) -> Floats:
