@@ -34,6 +34,11 @@ _AS_STATED = 1.3
 """Ratio of noise to that of the default up to which the default's is taken: units of one type differ by less."""
 
 
+_FAR_ABOVE = 2.5
+"""Ratio of the noise of rests to the stated one from which the file is at fault: a table that vibrates hardly doubles
+what an IMU of the file would show."""
+
+
 @dataclass(frozen=True)
 class RestsShown:
     """What the rests show of an IMU.
@@ -109,6 +114,36 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
     )
     error = np.abs(force - STANDARD_GRAVITY)
     return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
+
+
+def understated_noise(recording: Recording, imu: ImuSpecification) -> str:
+    """Say that the rests are far noisier than a specification states; empty where they are not, or there is no rest.
+
+    Parameters
+    ----------
+    recording : Recording
+        In SI.
+
+    Returns
+    -------
+    str
+        A part of a sentence: what is measured against what is stated, and what to do.
+    """
+    shown = shown_at_rest(recording)
+    if shown is None:
+        return ""
+    pairs = (
+        ("gyros", shown.gyro_noise, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
+        ("accelerometers", shown.accel_noise, imu.accel_white_noise, "ug/sqrt(Hz)"),
+    )
+    told = [
+        f"{whose} show {from_si(seen, unit):.2g} {unit} at rest where {imu.name} states {from_si(stated, unit):.2g}"
+        for whose, seen, stated, unit in pairs
+        if seen > _FAR_ABOVE * stated
+    ]
+    if not told:
+        return ""
+    return f"the likely cause is the noise in the IMU's file: {', '.join(told)}; take {Option.NOISE} estimated"
 
 
 def _white_noise(values: Floats, rests: StaticIntervals, interval_s: float, usual: float) -> float:

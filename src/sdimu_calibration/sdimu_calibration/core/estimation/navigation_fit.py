@@ -13,6 +13,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.data.imu_class import understated_noise
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
@@ -55,6 +56,8 @@ within a few per cent of it."""
 _FAST = 3.0
 """NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
 2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
+_NOISY = 4.0
+"""NIS per degree of freedom (1) from which the rests are looked at: noise of twice the stated size is possible."""
 _OF_THE_PASSES = ("bend", "known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
@@ -410,8 +413,13 @@ class NavigationFit(Fit):
             return ""
         return (
             f"the recording contradicts the model: squared innovations are {nis:.3g} times what the noise explains"
-            f"{self._lost_in_words()}; check {Option.IMU}, {Option.SITE}, units and axes"
+            f"{self._lost_in_words()}; check {Option.IMU}, {Option.SITE}, units and axes{self._noise_in_words(nis)}"
         )
+
+    def _noise_in_words(self, nis: float) -> str:
+        """Name the noise of the IMU's file where it is the likely cause of a misfit; the rests are looked at."""
+        told = understated_noise(self.test.recording, self.test.imu) if nis > _NOISY else ""
+        return told and f"; {told}"
 
     def _lost_in_words(self) -> str:
         lost = int(self.prepared.cycles.lost.sum())
@@ -426,6 +434,7 @@ class NavigationFit(Fit):
             nis, held_out = statistics.nis_mean, statistics.held_out_rms
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
+            told += self._noise_in_words(nis)
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)

@@ -24,6 +24,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
 from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
+from sdimu_calibration.core.data.imu_class import understated_noise
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.accelerometer_frame import (
     FRAME,
@@ -103,9 +104,10 @@ def solve(
     try:
         fit = replace(make(test, model, start, progress), reason=choice.reason)
     except DivergedError as error:
-        if not test.assumed_site:
-            raise
-        raise DivergedError(f"{error} (no site was stated: {test.assumed_site} was assumed)") from error
+        noise = understated_noise(test.recording, test.imu)
+        cause = f"; {noise}" if noise else ""
+        assumed = f" (no site was stated: {test.assumed_site} was assumed)" if test.assumed_site else ""
+        raise DivergedError(f"{error}{cause}{assumed}") from error
     if not learn:
         return fit
     found = noise_of(fit)
