@@ -19,7 +19,9 @@ from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.files.bounded_file import check_regular, read_bounded, read_text
 from sdimu_calibration.storage.files.config import read_mapping
 from sdimu_calibration.storage.files.json_file import LONGEST_JSON, read_json
+from sdimu_calibration.storage.files.limits_file import read_limits
 from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
+from sdimu_calibration.storage.files.reference_file import read_truth
 from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.importing.map_proposal import propose_maps
 from sdimu_calibration.storage.importing.text_table import TextTable
@@ -31,6 +33,8 @@ READERS = {
     "json": lambda path: read_json(path, "x/1"),
     "result": read_result,
     "noise": read_noise_terms,
+    "limits": lambda path: read_limits(path, {"gyro bias": "deg/h"}),
+    "truth": lambda path: read_truth(path, "prior"),
     "columns": TextTable,
     "map": lambda path: list(propose_maps([path])),
     "bag": bag_parts,

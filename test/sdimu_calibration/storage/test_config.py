@@ -1,6 +1,7 @@
 """Configuration files: what is read is SI, and what is wrong is said in one line."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -136,6 +137,14 @@ def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected)
         ("site", "height_m: 0", "height_m: -7e6", "height_m: .*greater than or equal to -5000"),
         ("site", "36.4", ".nan", "latitude_deg: "),
         ("site", SITE, "", "found nothing"),
+        ("site", "36.4", "yes", "latitude_deg: expected a number, found 'True'"),
+        ("site", "height_m: 0", "height_m: 0\nmagnetic_field_nt: [yes, 0, 0]", "magnetic_field_nt: expected a number"),
+        (
+            "plan",
+            "turns:",
+            "turns:" + "\n  - {axis: X, angle: 1 deg}" * 2001,
+            "turns: 200[0-9] of them, more than 2000",
+        ),
     ],
 )
 def test_a_wrong_file_gives_one_line_with_file_and_key(tmp_path, kind, old, new, message):
@@ -161,6 +170,13 @@ def test_a_prior_that_no_effect_reads_is_refused_by_the_model(tmp_path, old, new
     with pytest.raises(DataError, match=message) as caught:
         build(["gyro_bias", "accel_scale"], load_imu(path))
     assert str(caught.value).startswith(f"{path}: prior.")
+
+
+@pytest.mark.parametrize("load", [load_plan, load_imu, load_model, load_site])
+def test_a_pipe_in_the_place_of_a_configuration_is_told_as_such(tmp_path, load):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(DataError, match=r"pipe\.yaml: is a device or a pipe"):
+        load(tmp_path / "pipe.yaml")
 
 
 def test_an_unknown_name_lists_the_names_there_are():

@@ -93,6 +93,14 @@ def test_a_mean_bias_that_is_no_list_of_numbers_is_one_line(tmp_path, mean):
     assert "mean_bias" in refusal(read_truth, written(tmp_path / "t.yaml", truth), "prior")
 
 
+@pytest.mark.parametrize("coefficients", ["{gyro_bias_x: .nan}", "{gyro_bias_x: .inf}", "{}", "{hello: 1.0}", "{5: 5}"])
+def test_a_truth_that_tells_nothing_is_one_line(tmp_path, coefficients):
+    path = written(tmp_path / "t.yaml", f"format: sdimu-truth/1\ncoefficients: {coefficients}")
+    told = refusal(read_truth, path, "prior")
+    assert "gyro_bias_x" in told
+    assert "is no size" in told or "names no coefficient that is known" in told
+
+
 def test_a_nul_in_the_path_of_a_bag_is_one_line(tmp_path):
     path = written(tmp_path / "set.yaml", 'format: sdimu-set/1\nrecordings: [{bag: "a\\0b"}]')
     assert "recordings.0.bag: a path has no NUL" in refusal(load_set, path, BagSource(tmp_path))

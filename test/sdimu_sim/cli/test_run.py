@@ -139,7 +139,14 @@ def test_turns_that_the_test_chose_itself_are_not_scolded():
 
 
 @pytest.mark.parametrize(
-    "choices", ["[]", "[1]", "{}", '[{"text": "end"}]', '[{"until_s": "x", "text": "", "reached": true}]']
+    "choices",
+    [
+        "[]",
+        "[1]",
+        "{}",
+        '[{"text": "end"}]',
+        *(f'[{{"until_s": {until}, "text": "", "reached": true}}]' for until in ('"x"', "1" * 400, "NaN", "-1")),
+    ],
 )
 def test_choices_that_are_none_are_refused_in_one_line(tmp_path, choices):
     path = tmp_path / "choices.json"

@@ -424,8 +424,13 @@ def _tell_choices(console: Console, path: Path) -> dict[str, Any]:
 
 def _is_choice(choice: object) -> bool:
     """Whether an entry of choices.json has what is told of it."""
+    from sdimu_calibration.storage.files.config import LONGEST_PLAN_S
+
     kinds = {"until_s": int | float, "text": str, "reached": bool}
-    return isinstance(choice, dict) and all(isinstance(choice.get(key), kind) for key, kind in kinds.items())
+    if not (isinstance(choice, dict) and all(isinstance(choice.get(key), kind) for key, kind in kinds.items())):
+        return False
+    # A whole number of JSON may be larger than any number of Python's.
+    return bool(0.0 <= choice["until_s"] <= LONGEST_PLAN_S)
 
 
 def _say_measured(console: Console, out: Path, result: Calibration, streamed: float, wall: float) -> None:

@@ -17,20 +17,32 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import yaml
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
 from sdimu_calibration.core.units import from_si, parse_quantity, parse_unit
-from sdimu_calibration.storage.files.bounded_file import read_text
+from sdimu_calibration.storage.files.bounded_file import check_regular, read_text
 
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
 
 LONGEST_PLAN_S = 7.0 * 86400.0
 """A plan beyond a week is one with a wrong unit; its samples would not fit into the memory."""
+
+MOST_TURNS = 2000
+"""Number of turns of a plan (1): those of a test are tens, and a forecast of thousands takes minutes."""
 
 LONGEST_FILE = 1 << 20
 """Bytes of a configuration at most: reading YAML takes ten seconds a megabyte."""
@@ -54,6 +66,22 @@ class Schema(BaseModel):
     """Base of every file schema: no unknown keys, no infinities."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, protected_namespaces=())
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_value(cls, value: Any, about: ValidationInfo) -> Any:
+        """Refuse `yes` for a number, which YAML takes for true, and Python for 1."""
+        kinds = _parts(cls.model_fields[str(about.field_name)].annotation)
+        number = (int in kinds or float in kinds) and not (bool in kinds or str in kinds)
+        given = value if isinstance(value, list | tuple) else [value]
+        if number and any(isinstance(one, bool) for one in given):
+            raise ValueError(f"expected a number, found '{value}', which YAML takes for yes or no")
+        return value
+
+
+def _parts(kind: Any) -> list[Any]:
+    """List a type and all that it is made of."""
+    return [kind, *(part for one in get_args(kind) for part in _parts(one))]
 
 
 S = TypeVar("S", bound=Schema)
@@ -146,6 +174,8 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
             return path
         if path.is_dir():
             raise DataError(f"{path}: is a folder; name {_file_in(path, kind)}, or one of: {', '.join(_known(kind))}")
+        if path.exists():
+            check_regular(path)
         raise DataError(f"{path}: no such {kind} file")
     folder = config_folder() / kind
     for suffix in _SUFFIXES:
@@ -363,6 +393,8 @@ def load_plan(name_or_path: str | Path) -> Plan:
     """
     path = find_config("plan", name_or_path)
     file = read_yaml(path, _PlanFile)
+    if len(file.turns) > MOST_TURNS:
+        raise DataError(f"{path}: turns: {len(file.turns)} of them, more than {MOST_TURNS}; make several plans of them")
     for number, turn in enumerate(file.turns, start=1):
         if turn.angle == 0.0:
             raise DataError(f"{path}: turn {number}: angle is zero (expected a signed angle such as '90 deg')")

@@ -31,8 +31,6 @@ def read_limits(path: Path, terms: Mapping[str, str]) -> dict[str, float]:
     dict of str to float
         Largest size allowed (SI) by term.
     """
-    if not path.is_file():
-        raise DataError(f"{path}: no such file of limits")
     out = {}
     for term, text in read_yaml(path, _LimitsFile).limits.items():
         if term not in terms:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.bias import ACCEL_BIAS, GYRO_BIAS
 from sdimu_calibration.core.effects.gyro_g_sensitivity import G_SENSITIVITY
 from sdimu_calibration.core.effects.mass_unbalance import GYRO_MASS_UNBALANCE
 from sdimu_calibration.core.effects.misalignment import ACCEL_MISALIGNMENT
@@ -20,6 +22,8 @@ from sdimu_calibration.storage.files.config import find_config, read_mapping
 
 _TRUTH_FORMAT = "sdimu-truth/1"
 _REFERENCE_FORMAT = "sdimu-reference/1"
+_KNOWN = frozenset((*GYRO_BIAS.labels, *ACCEL_BIAS.labels))
+"""Coefficients of which every truth has some."""
 _SCALE = frozenset(ACCEL_SCALE.labels)
 _RESPONSES = frozenset((*ACCEL_MISALIGNMENT.labels, *GYRO_MASS_UNBALANCE.labels, *G_SENSITIVITY.labels))
 """Other coefficients that multiply the force."""
@@ -81,8 +85,6 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
         True value (SI) by coefficient name.
     """
     path = Path(path)
-    if not path.is_file():
-        raise DataError(f"{path}: no such file")
     content = read_mapping(path)
     if content.get("format") != _TRUTH_FORMAT:
         raise DataError(f"{path}: format is {content.get('format')!r}, expected '{_TRUTH_FORMAT}'")
@@ -90,6 +92,8 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
     values = content.get(key)
     if not isinstance(values, Mapping):
         raise DataError(f"{path}: no '{key}': the truth is not given in the body frame '{body_frame}'")
+    if not _KNOWN & values.keys():
+        raise DataError(f"{path}: {key}: names no coefficient that is known, such as gyro_bias_x")
     # Biases that drift or wander are estimated in the mean over the dwells.
     mean = content.get("mean_bias") or {}
     if not isinstance(mean, Mapping):
@@ -127,6 +131,9 @@ def _number(path: Path, name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise DataError(f"{path}: {name}: expected a number in SI")
     try:
-        return float(value)
+        number = float(value)
     except OverflowError as error:
         raise DataError(f"{path}: {name}: larger than any number can be") from error
+    if not math.isfinite(number):
+        raise DataError(f"{path}: {name}: {number} is no size; expected a number in SI")
+    return number
