@@ -73,6 +73,21 @@ def test_a_plan_keeps_to_the_minutes_or_says_what_the_shortest_takes(folder, cap
     assert f"fits in --minutes 1: the shortest takes {minutes:.1f} min" in said
 
 
+def test_minutes_that_leave_no_turn_leave_no_plan(tmp_path, capsys):
+    plan(plan="kim18", minutes=1.0, tries=1, out=tmp_path / "found.yaml")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no plan with the attitudes of kim18 that turns the IMU fits in --minutes 1; no file written" in said
+    assert not (tmp_path / "found.yaml").exists()
+
+
+@pytest.mark.parametrize(("minutes", "told"), [(3.0, True), (20.0, False)])
+def test_what_a_short_plan_does_not_show_is_told(tmp_path, capsys, minutes, told):
+    plan(plan="kim18", minutes=minutes, tries=1, out=tmp_path / "found.yaml")
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("it shows nothing of gyro_scale, gyro_misalignment, gyro_mass_unbalance, accel_bias" in said) == told
+    assert load_plan(tmp_path / "found.yaml").turns
+
+
 def test_the_shortest_recording_that_tells_them_apart_turns_at_another_rate(folder, capsys):
     plan(plan="kim18", after=[folder], tell=list(OPEN))
     heading, first = capsys.readouterr().out.splitlines()[:2]

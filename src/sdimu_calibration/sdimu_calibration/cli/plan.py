@@ -237,6 +237,14 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
             f"no plan with the attitudes of {start.name} fits in --minutes {minutes:g}: the shortest takes "
             f"{found.minutes:.1f} min (shorter --dwells, faster --rates, or a --plan with fewer stops)",
         )
+    if start.turns and not found.plan.turns:
+        say(
+            console,
+            f"no plan with the attitudes of {start.name} that turns the IMU fits in --minutes {minutes:g}; no file "
+            "written (more --minutes, shorter --dwells, faster --rates, or a --plan with fewer stops)",
+        )
+        answer(_content(start, known, first, found, limits, None), request.as_json)
+        return
     if found.plan is start:
         say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
         answer(_content(start, known, first, found, limits, None), request.as_json)
@@ -250,6 +258,9 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
         f"plans tried; in {out}. To look at it:",
     )
     command(console, joined(["sdimu", "predict", "--plan", str(out), "--imu", asked.imu, "--site", asked.site]))
+    unseen = found.bounds.unseen
+    if unseen:
+        say(console, f"of one axis or more it shows nothing of {', '.join(unseen)}: the sigma stays that of the prior")
     answer(_content(start, known, first, found, limits, out), request.as_json)
 
 

@@ -18,6 +18,8 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _FIXED = 1e-6
 """Share of its prior below which a sigma is zero by definition of the body frame: above rounding."""
+_UNSEEN = 0.99
+"""Share of its prior from which a sigma tells nothing (1): what a plan shows is at most a hundredth of it."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,12 @@ class Bounds:
             if sigma > _FIXED * prior:
                 out[effect] = max(out.get(effect, 0.0), float(sigma))
         return out
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Effects with a coefficient of which a plan shows nothing: its sigma stays that of the prior, or nearly so."""
+        stays = self.sigma > _UNSEEN * self.prior
+        return tuple(dict.fromkeys(effect for effect, one in zip(self.effect, stays, strict=True) if one))
 
     @property
     def spread(self) -> float:
