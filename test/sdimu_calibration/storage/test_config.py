@@ -137,6 +137,7 @@ def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected)
         ("site", "height_m: 0", "height_m: -7e6", "height_m: .*greater than or equal to -5000"),
         ("site", "36.4", ".nan", "latitude_deg: "),
         ("site", SITE, "", "found nothing"),
+        ("imu", "1 deg/h,", "1e-300 deg/h,", "prior.gyro_bias: .*smaller than any sigma"),
         ("site", "36.4", "yes", "latitude_deg: expected a number, found 'True'"),
         ("site", "height_m: 0", "height_m: 0\nmagnetic_field_nt: [yes, 0, 0]", "magnetic_field_nt: expected a number"),
         (

@@ -105,7 +105,10 @@ def solve(
         fit = replace(make(test, model, start, progress), reason=choice.reason)
     except DivergedError as error:
         noise = understated_noise(test.recording, test.imu)
-        cause = f"; {noise}" if noise else ""
+        stated = ", ".join(one.name for one in model.priors)
+        cause = (f"; {noise}" if noise else "") + (
+            f"; check the priors that the model states: {stated}" if stated else ""
+        )
         assumed = f" (no site was stated: {test.assumed_site} was assumed)" if test.assumed_site else ""
         raise DivergedError(f"{error}{cause}{assumed}") from error
     if not learn:

@@ -53,6 +53,9 @@ DEEPEST = 32
 LARGEST_LATITUDE_SIGMA = math.radians(2.0)
 """Largest sigma of a latitude (rad): beyond it the square of the error counts, and a map knows better."""
 
+SMALLEST_SIGMA = 1e-40
+"""Sigma (SI) of any coefficient at least: the squares of smaller ones, and what is divided by them, are no numbers."""
+
 LARGEST_GRAVITY_SIGMA = 0.05
 """Largest sigma of gravity (m/s^2): from the equator to a pole it changes by as much."""
 
@@ -137,6 +140,10 @@ def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
     size, unit = _signed_quantity(value)
     if size < 0.0:
         raise ValueError(f"'{value}' is below zero (expected a sigma)")
+    if 0.0 < size < SMALLEST_SIGMA:
+        raise ValueError(
+            f"'{value}' is smaller than any sigma (at least {SMALLEST_SIGMA:g} in SI units; check its exponent)"
+        )
     return size, unit
 
 
