@@ -124,6 +124,12 @@ def test_a_file_is_read_to_its_longest_and_no_further(tmp_path):
         read_bounded(Path("/proc/self/status"), 3)
 
 
+def test_no_more_memory_is_taken_than_the_file_needs(tmp_path):
+    path = tmp_path / "x"
+    path.write_bytes(b"1234")
+    assert read_bounded(path, 1 << 60) == b"1234"
+
+
 def test_a_file_of_holes_is_refused_before_it_is_read(tmp_path):
     with (tmp_path / "holes.json").open("wb") as stream:
         stream.truncate(LONGEST_JSON + 1)

@@ -35,9 +35,12 @@ def read_bounded(path: Path, longest: int) -> bytes:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
             if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
                 raise _no_file(path)
-            # What the system says of the size comes first; a file that grows is read to one byte beyond.
+            # What the system says of the size comes first: memory is taken for what is asked for, not for what is there.
             size = os.fstat(stream.fileno()).st_size
-            content = stream.read(longest + 1) if size <= longest else b""
+            content = stream.read(size + 1) if size <= longest else b""
+            # A file that grows, or that the system makes as it is read.
+            if len(content) > size:
+                content += stream.read(longest + 1 - len(content))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from error
     if max(size, len(content)) > longest:
