@@ -110,6 +110,24 @@ def test_results_of_another_version_are_told(folder):
         plan(plan="kim18", after=[folder])
 
 
+@pytest.mark.parametrize(("row", "column", "value"), [(0, 0, -1e308), (15, 15, 0.0), (0, 5, 1e18), (5, 5, -1e30)])
+def test_information_that_is_of_no_data_is_refused(standing, folder, row, column, value):
+    J = standing.known.J.copy()
+    J[row, column] = value
+    damaged = replace(standing, known=replace(standing.known, J=J))
+    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
+    with pytest.raises(DataError, match=r"set\.json: known: damaged .*(below zero|of no data)"):
+        read_standing(folder)
+
+
+@pytest.mark.parametrize("prior", [0.0, -1.0])
+def test_a_prior_of_nothing_is_refused(standing, folder, prior):
+    damaged = replace(standing, known=replace(standing.known, prior=np.full(len(standing.known.prior), prior)))
+    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
+    with pytest.raises(DataError, match="a prior is not above zero"):
+        read_standing(folder)
+
+
 HEAT = ("accel_bias_temperature_x", "accel_scale_temperature_x")
 
 

@@ -176,6 +176,8 @@ def _damaged(tmp_path, key, value):
         (("covariance", 0, 0), -1.0, "covariance: a variance is below zero"),
         (("covariance", 0, 1), 1e3, "covariance: is not symmetric"),
         (("covariance",), [[1.0] * 3, [1.0, 1e-3, 1.0], [1.0] * 3], "covariance: a correlation is beyond 1"),
+        (("history", "stop"), [0.5] * 7, "history.stop: a list of numbers"),
+        (("history", "stop"), [-1e308] * 7, "history.stop: a list of numbers"),
         (("history", "dwell"), [2] * 7, "history.dwell: a list of numbers"),
         (("fit", "held_out_rms"), [1, 2], "fit.held_out_rms."),
         (("fit", "held_out_rms"), "loud", "fit.held_out_rms."),

@@ -82,13 +82,17 @@ def _or(default: Any, value: Any) -> Any:
 def _array(dtype: Any, value: Any) -> NDArray[Any]:
     try:
         given = np.array(value)
-        found = given.astype(dtype)
+        with np.errstate(invalid="ignore"):
+            found = given.astype(dtype)
     except (TypeError, OverflowError, ValueError) as error:
         raise ValueError(_NO_NUMBERS) from error
     # numpy would take text and truth values for numbers.
     mixed = given.dtype.kind == "O" and any(isinstance(one, str | bool) for one in given.flat)
     truth = given.dtype.kind == "b", found.dtype.kind == "b"
-    if not given.ndim or mixed or given.dtype.kind in "US" or (given.size and truth[0] != truth[1]):
+    other = given.dtype.kind in "US" or (given.size and truth[0] != truth[1])
+    # A stop that is no whole number, or larger than any.
+    cut = found.dtype.kind == "i" and not np.array_equal(found, given)
+    if not given.ndim or mixed or other or cut:
         raise ValueError(_NO_NUMBERS)
     return found
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import body_frame, imu_model
 from sdimu_calibration.core.evidence.known import Known, Standing, known_from
 from sdimu_calibration.core.recording import DataError
@@ -15,6 +16,8 @@ from sdimu_calibration.storage.files.json_file import entry, read_json
 from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, wrong
 
+_ROUNDING = 1e-6
+"""Share of the information of two coefficients (1) by which rounding may move what they have in common."""
 FILES = {"set.json": "sdimu-set-diagnosis/1", "diagnosis.json": "sdimu-diagnosis/1"}
 """Files that hold what is known, and their formats."""
 
@@ -46,8 +49,22 @@ class KnownEntry(ResultModel):
         if shapes != ((k, k), (k,), (k,)) or not np.isfinite(self.information).all():
             raise ValueError(f"expected {k} finite rows and columns")
         prior = np.where(np.isnan(self.prior), np.inf, self.prior)
+        if not (prior > 0.0).all():
+            raise ValueError("a prior is not above zero")
+        _check_information(self.information + np.diag(prior**-2.0))
         known = Known(self.names, self.information, prior, self.scatter)
         return Standing(known, self.added, self.open, self.imu, self.site)
+
+
+def _check_information(information: Floats) -> None:
+    """Raise ValueError where data and priors together (k, k) are no information: the inverse is then no covariance."""
+    largest = np.diag(information)
+    if (largest < 0.0).any():
+        raise ValueError("information below zero")
+    scale = np.divide(1.0, np.sqrt(largest), out=np.zeros(len(largest)), where=largest > 0.0)
+    shares = scale[:, None] * information * scale
+    if (np.abs(shares - shares.T) > _ROUNDING).any() or np.linalg.eigvalsh(shares).min(initial=0.0) < -_ROUNDING:
+        raise ValueError("the information is that of no data: not symmetric, or below zero along some direction")
 
 
 def holds_standing(path: Path) -> bool:
