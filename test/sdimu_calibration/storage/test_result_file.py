@@ -189,6 +189,16 @@ def test_numbers_that_are_none_and_units_that_are_not_taken_are_refused(tmp_path
     assert told in str(error.value)
 
 
+@pytest.mark.parametrize(("start", "right"), [(-(10**7), True), (-(10**9), True), (-(10**18), False), (2**63, False)])
+def test_a_recording_may_begin_an_interval_before_its_first_stamp_of_zero(tmp_path, start, right):
+    path = _damaged(tmp_path, ("origin", "start_ns"), start)
+    if right:
+        assert read_result(path).origin.start_ns == start
+    else:
+        with pytest.raises(DataError, match="which is no stamp"):
+            read_result(path)
+
+
 @pytest.mark.parametrize("key", [("coefficients", 1, "value"), ("covariance", 1, 1)])
 def test_a_value_that_is_no_number_is_read_but_not_used(tmp_path, key):
     path = _damaged(tmp_path, key, None)

@@ -65,6 +65,8 @@ _TOPICS = {NOT_TRUSTED: Topic.NOT_TRUSTED, INSEPARABLE: Topic.INSEPARABLE}
 """What a line of a file is about, by its words."""
 _SLACK_OF_CORRELATION = 1e-3
 """Share of the product of two sigmas (1) by which rounding may move a covariance: far below a digit that is wrong."""
+_EARLIEST_NS = -(10**9)
+"""Start (ns) of a recording at least: an interval before its first stamp, which may be 0."""
 _LATEST_NS = 2**63
 """A stamp of 64 bits ends there."""
 
@@ -76,7 +78,7 @@ def _is_word(value: str) -> str:
 
 
 def _is_stamped(origin: Origin) -> Origin:
-    if not 0 <= origin.start_ns < _LATEST_NS:
+    if not _EARLIEST_NS <= origin.start_ns < _LATEST_NS:
         raise ValueError(f"start_ns is {reprlib.repr(origin.start_ns)}, which is no stamp")
     return origin
 
