@@ -35,7 +35,7 @@ def read_bounded(path: Path, longest: int) -> bytes:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
             if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
                 raise _no_file(path)
-            # What the system says of the size comes first: memory is taken for what is asked for, not for what is there.
+            # The size that the system gives comes first: memory is taken for what is asked for, not for what is there.
             size = os.fstat(stream.fileno()).st_size
             content = stream.read(size + 1) if size <= longest else b""
             # A file that grows, or that the system makes as it is read.
