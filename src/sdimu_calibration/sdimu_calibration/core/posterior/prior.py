@@ -40,6 +40,8 @@ WIDTH_SHARES = (0.74, 0.24, 0.02)
 """Probability (1) of each of `WIDTHS`: one part in fifty is broken, one in four is out of its class."""
 MOST_DRIFTS = 4
 """Number of drifts of one bias (1) that a model has at most: more of them follow any wander, and noise is that."""
+_MOST_KEPT = 4000
+"""Number of models (1) whose odds of one more are kept: 20 MB; a search asks for those of one model four times."""
 _TWINS = 1e-8
 """Share (1) by which two signatures differ at most to be one: rounding; a difference of this size needs 5000 sigma."""
 UNKNOWN_SIZE = 30.0
@@ -109,6 +111,10 @@ class Prior:
         return np.ascontiguousarray(np.column_stack([self.parameter, self.twin, self.cause, self.drift]))
 
     @cached_property
+    def _odds_beside(self) -> dict[tuple[int, ...], Floats]:
+        return {}
+
+    @cached_property
     def _known_odds(self) -> dict[int, Floats]:
         return {}
 
@@ -135,10 +141,16 @@ class Prior:
         Returns
         -------
         ndarray, shape (q,)
-            Log (1); -inf for those that the model has already.
+            Log (1), not to be written to; -inf for those that the model has already.
         """
-        members, next_one = np.asarray(base, dtype=np.int64), self._next_one(self.named(base))
-        return odds_beside(next_one, self._alike, self.repeats, members, KIN, MOST_DRIFTS)
+        of_model, kept = tuple(sorted(base)), self._odds_beside
+        odds = kept.get(of_model)
+        if odds is None:
+            if len(kept) >= _MOST_KEPT:
+                kept.clear()
+            members, next_one = np.array(of_model, dtype=np.int64), self._next_one(self.named(of_model))
+            kept[of_model] = odds = odds_beside(next_one, self._alike, self.repeats, members, KIN, MOST_DRIFTS)
+        return odds
 
     def apart(self, base: Sequence[int], use: Ints) -> tuple[Ints, Ints]:
         """Say which pairs no model may hold: variants of one parameter, twins, more drifts of a bias than allowed.
