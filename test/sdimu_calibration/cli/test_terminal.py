@@ -24,7 +24,7 @@ from sdimu_calibration.storage.files.advice_words import sentence
 
 WIDTH = 80
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-BAR = re.compile(r"\x1b\[\?25l.*?\x1b\[\?25h(?:\r?\x1b\[1A\x1b\[2K)*", re.DOTALL)
+BAR = re.compile(r"\x1b\[\?25l.*?\x1b\[\?25h(?:\n?\r?\x1b\[1A\x1b\[2K)*", re.DOTALL)
 """A bar of progress, from the hidden cursor to the line that it erases: it comes where the work takes seconds."""
 EFFECT = "gyro_scale_asymmetry_y"
 PLAN = """format: sdimu-plan/1
