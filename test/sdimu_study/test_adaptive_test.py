@@ -52,3 +52,8 @@ def test_every_choice_has_its_reason_and_its_time(done):
     assert all("limit" in choice.reason for _, choice in done.choices)
     total = FIRST_STOP_S / 60.0 + sum(choice.minutes for _, choice in done.choices)
     assert total == pytest.approx(done.plan.duration_s / 60.0, abs=0.02)
+
+
+def test_every_axis_is_turned_in_both_senses(done):
+    senses = {(turn.axis, turn.angle_rad > 0.0) for turn in done.plan.turns}
+    assert senses == {(axis, sense) for axis in "XYZ" for sense in (True, False)}

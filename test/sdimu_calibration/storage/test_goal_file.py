@@ -29,3 +29,11 @@ def test_a_name_that_a_terminal_would_obey_is_written_out(tmp_path):
     name = load_goals(path).name
     assert name.isprintable()
     assert name.startswith("quick")
+
+
+def test_one_sense_of_turn_is_enough_only_where_the_file_says_so(tmp_path):
+    path = tmp_path / "goal.yaml"
+    path.write_text("format: sdimu-goal/1\nlimits: {gyro_scale: 5 ppm}\n")
+    assert load_goals(path).both_senses
+    path.write_text("format: sdimu-goal/1\nboth_senses: false\nlimits: {gyro_scale: 5 ppm}\n")
+    assert not load_goals(path).both_senses

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.adaptive import Choice, End, Goals, Menu, choose, fitted, so_far
+from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, fitted, so_far
 from sdimu_calibration.core.adaptive.choice import most_gain
 from sdimu_calibration.core.adaptive.knowledge import OpenClass, ratios
 from sdimu_calibration.core.adaptive.worth import separation, worth
@@ -75,7 +75,8 @@ def test_what_the_time_left_can_bring_is_the_gain_of_information_that_grows_as_t
     assert most_gain(rate, 60.0, 60.0) == math.inf
 
 
-def test_a_test_that_gains_little_ends_only_where_its_limits_are_out_of_reach(known, monkeypatch):
+def test_a_test_that_gains_little_ends_only_where_its_limits_are_out_of_reach(first_stop, monkeypatch):
+    known = fitted(first_stop, replace(GOALS, both_senses=False))
     monkeypatch.setattr("sdimu_calibration.core.adaptive.choice._NOTHING_NAT", math.inf)
     begun = 20.0 / 60.0
     assert isinstance(choose(known, GOALS, Menu(), GOALS.minutes - begun), Choice)
@@ -135,11 +136,58 @@ def test_what_has_the_same_signature_is_never_apart():
     assert separation(known, twin, same[None])[0, 0] < 1e-6 * size[0] ** 2 / s2
 
 
-def test_ratios_are_sigmas_in_the_reported_frame_over_their_limits(known, first_stop):
+def test_ratios_are_sigmas_in_the_reported_frame_over_their_limits(first_stop):
+    known = fitted(first_stop, replace(GOALS, both_senses=False))
     limited, limit = GOALS.of(first_stop.names, first_stop.model.body_frame)
     expected = np.sqrt(np.diag(first_stop.covariance)[limited]) / limit
     np.testing.assert_allclose(ratios(known.at, GOALS, known.at.covariance), expected, rtol=1e-6)
     assert not any(name in known.limited for name in ("accel_misalignment_xy", "accel_misalignment_xz"))
+
+
+def scale_known(*degrees: float, both_senses: bool = True) -> tuple[Knowledge, Goals]:
+    """What is known after turns about y, where nothing but scale factors of gyros has a limit."""
+    turns = tuple(Turn("Y", math.radians(angle), math.radians(10.0)) for angle in degrees)
+    goals = Goals("scale", {"gyro_scale": GOALS.limits["gyro_scale"]}, 30.0, both_senses)
+    return fitted(perfect_fit(Plan("turns about y", (30.0,) * (len(turns) + 1), turns, ACCELERATION)), goals), goals
+
+
+def test_the_limit_of_a_scale_factor_does_not_hold_while_an_asymmetry_may_hide_in_it():
+    one, goals = scale_known(180.0, 180.0)
+    y = one.limited.index("gyro_scale_y")
+    alone, _ = scale_known(180.0, 180.0, both_senses=False)
+    assert alone.ratio[y] < 1.0
+    # Turns in one sense say nothing of an asymmetry: all of its prior may be in the scale factor.
+    sensors = one.at.setup.sensors
+    prior = sensors.prior[sensors.names.index("gyro_scale_asymmetry_y")]
+    assert one.ratio[y] == pytest.approx(math.hypot(alone.ratio[y], prior / goals.limits["gyro_scale"]), rel=0.02)
+
+
+def test_turns_in_both_senses_make_the_limit_of_a_scale_factor_hold():
+    both, _ = scale_known(90.0, 90.0, -90.0, -90.0)
+    alone, _ = scale_known(90.0, 90.0, -90.0, -90.0, both_senses=False)
+    y = both.limited.index("gyro_scale_y")
+    assert both.ratio[y] < 1.0
+    assert both.ratio[y] == pytest.approx(alone.ratio[y], rel=0.02)
+
+
+def test_a_turn_in_the_other_sense_is_chosen_where_only_an_asymmetry_keeps_a_limit_from_holding():
+    one, goals = scale_known(180.0, 180.0)
+    choice = choose(one, goals, Menu(), 30.0, lambda step: step.turn.axis == "Y")
+    assert isinstance(choice, Choice)
+    assert choice.step.turn.angle_rad < 0.0
+
+
+def test_an_asymmetry_that_is_estimated_hides_nothing():
+    fit = perfect_fit(BOTH_SENSES, PAIR[:1])
+    known = fitted(fit, GOALS, [resolve("gyro_scale_asymmetry_x")])
+    assert known.at.names[len(fit.names) :] == ("gyro_scale_asymmetry_x", "gyro_scale_asymmetry_z")
+
+
+def test_a_limit_of_what_is_estimated_along_but_not_in_the_model_counts_for_nothing(first_stop):
+    also = replace(GOALS, limits={**GOALS.limits, "gyro_scale_asymmetry": 1e-6, "gyro_scale_quadratic": 1e-6})
+    known = fitted(first_stop, also, [resolve(PAIR[1])])
+    assert known.limited == fitted(first_stop, GOALS).limited
+    assert isinstance(choose(known, also, Menu(), 30.0), Choice)
 
 
 def test_limits_of_nothing_in_the_model_are_refused(first_stop):

@@ -22,11 +22,15 @@ class Goals:
         Largest sigma allowed, by effect (SI).
     minutes : float
         Time there is (min).
+    both_senses : bool
+        A limit of a gyro's scale factor holds only where an asymmetry that the test has not shown, of the size that
+        physics gives it, cannot hide more: turns about each axis in both senses.
     """
 
     name: str
     limits: Mapping[str, float]
     minutes: float
+    both_senses: bool = True
 
     def of(self, names: Sequence[str], frame: str) -> tuple[Bools, Floats]:
         """Find the coefficients that have a limit.

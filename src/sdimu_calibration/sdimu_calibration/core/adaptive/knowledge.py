@@ -15,6 +15,7 @@ from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.gyro_rate_nonlinearity import SCALE_ASYMMETRY
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
@@ -65,7 +66,8 @@ class Knowledge:
     limited : tuple of str, length c
         Coefficients with a limit.
     ratio : ndarray, shape (c,)
-        Sigma of every coefficient with a limit over that limit, in the noise of the fit (1).
+        Sigma of every coefficient with a limit over that limit, in the noise of the fit (1); with what asymmetries may
+        hide where the goals ask for both senses.
     noise : ndarray, shape (c,)
         Sigma in the noise of the fit over that in white noise (1).
     open : OpenClass or None
@@ -101,7 +103,7 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
     if not alike:
         return replace(known, verdict=found.verdict)
-    count = len(known.at.names) - len(alike)
+    count = known.at.own
     columns = (count - len(named) + place, *range(count, count + len(alike)))
     one = OpenClass(named[place], tuple(c.label for c in alike), columns, sizes, needed)
     return replace(known, open=one, verdict=found.verdict)
@@ -121,13 +123,31 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         raise DataError(
             f"a {fit.estimator} fit says nothing of the next turn of a table: choose another {Option.ESTIMATOR}"
         )
-    at = so_far(fit, alike, _ROOM)
+    at = so_far(fit, alike, _ROOM, _hiding(fit, alike) if goals.both_senses else ())
     limited, limit = goals.of(fit.names, fit.model.body_frame)
     # The doubt about the model is no noise: what is too small to be found stays so, however long a test is.
     ratio = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited]) / limit
-    white = ratios(at, goals, at.covariance)
+    count = at.own
+    white = ratios(at, goals, _without(at.covariance, slice(count, None)))
+    unseen = ratios(at, goals, _without(at.covariance, slice(count, count + len(alike)))) / white
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
-    return Knowledge(at, names, ratio, np.maximum(ratio / white, 1.0), None, named, Verdict.CONSISTENT)
+    return Knowledge(at, names, ratio * unseen, np.maximum(ratio / white, 1.0), None, named, Verdict.CONSISTENT)
+
+
+def _hiding(fit: Fit, alike: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Asymmetries of gyros' scale factors, as far as neither the model nor the class has them.
+
+    Turns in one sense leave an asymmetry to the scale factor, and nothing of it stands out for a search to find.
+    """
+    has = {*fit.names, *(p.name for effect in alike for p in effect.parameters)}
+    left = tuple(p.name for p in SCALE_ASYMMETRY.parameters if p.name not in has)
+    return (SCALE_ASYMMETRY.only(left),) if left else ()
+
+
+def _without(covariance: Floats, rows: slice) -> Floats:
+    """Covariance (p, p) where the coefficients in `rows` are known."""
+    inner = covariance[rows, rows]
+    return covariance - covariance[:, rows] @ np.linalg.solve(inner, covariance[rows]) if len(inner) else covariance
 
 
 def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
@@ -144,8 +164,8 @@ def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
         Dimensionless.
     """
     frame = at.setup.model.body_frame
-    limited, limit = goals.of(at.names, frame)
-    J = body_frame.frame_jacobian(at.names, frame)[limited] / limit[:, None]
+    limited, limit = goals.of(at.names[: at.own], frame)
+    J = body_frame.frame_jacobian(at.names, frame)[: at.own][limited] / limit[:, None]
     return np.asarray(np.sqrt(np.einsum("ci,...ij,cj->...c", J, covariance, J)))
 
 

@@ -43,13 +43,16 @@ class SoFar:
     Attributes
     ----------
     setup : TestSetup
-        Its sensor model has p parameters: those of the fit, then candidates that the data leave open.
+        Its sensor model has p parameters: those of the fit, then candidates that the data leave open, then what may
+        hide.
     state : PassState
         Of the filter at the last epoch.
     temperature : TemperatureLog or None
         It stays as it was last.
     first : ndarray, shape (3, 3)
         Attitude at the first stop, b to n (dimensionless).
+    own : int
+        How many of the parameters are those of the fit.
     """
 
     setup: TestSetup
@@ -57,6 +60,7 @@ class SoFar:
     seen: Motion
     temperature: TemperatureLog | None
     first: Floats
+    own: int
 
     @property
     def square(self) -> bool:
@@ -96,7 +100,7 @@ class Ahead:
     end: SoFar
 
 
-def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -> SoFar:
+def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, hiding: Sequence[Effect] = ()) -> SoFar:
     """Bring the covariance to the end of a recording.
 
     Parameters
@@ -107,11 +111,16 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
         Candidates that are estimated along.
     room : float
         Prior of the candidates, as a multiple of the size that physics gives them.
+    hiding : sequence of Effect
+        What may be there unseen: estimated along, too, each with the size that physics gives it.
     """
-    model = replace(fit.model, effects=cast("tuple[str, ...]", (*fit.sensors.effects, *more)))
+    model = replace(fit.model, effects=cast("tuple[str, ...]", (*fit.sensors.effects, *more, *hiding)))
     setup = set_up(fit.test.site or fit.setup.site, fit.test.imu, model, fit.setup.epoch_s)
     sensors, had = setup.sensors, dict(zip(fit.setup.sensors.names, fit.setup.sensors.prior, strict=True))
-    prior = np.array([had.get(n, room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)])
+    own = {p.name for effect in hiding for p in effect.parameters}
+    prior = np.array(
+        [had.get(n, s if n in own else room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)]
+    )
     setup = replace(setup, sensors=replace(sensors, prior=prior))
     prepared, reference = fit.test.data(setup), fit.start.coefficients_of(sensors.names)
     C_nb = fit.start.C_nb.copy()
@@ -130,7 +139,7 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0) -
     output = new_output(len(prepared.epochs), len(prior), False, len(prepared.epochs))
     run_pass(data, pass_settings(setup, closed_loop=False), begin, output)
     check_finite(begin)
-    return SoFar(setup, _at_rest(setup, begin, C_nb), seen, prepared.temperature, fit.start.C_nb)
+    return SoFar(setup, _at_rest(setup, begin, C_nb), seen, prepared.temperature, fit.start.C_nb, len(fit.names))
 
 
 def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: float) -> Ahead:

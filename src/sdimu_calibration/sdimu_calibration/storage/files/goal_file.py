@@ -18,6 +18,7 @@ class _GoalFile(Schema):
     format: Literal["sdimu-goal/1"] = "sdimu-goal/1"
     name: Name | None = None
     minutes: Annotated[float, Field(gt=0, le=LONGEST_PLAN_S / 60.0)] = 60.0
+    both_senses: bool = True
     limits: dict[str, str]
 
 
@@ -37,4 +38,4 @@ def load_goals(name_or_path: str | Path) -> Goals:
             raise DataError(f"{path}: limits.{effect}: '{text}' must be more than zero")
     if not limits:
         raise DataError(f"{path}: limits: state one at least, such as gyro_bias: 0.016 deg/h")
-    return Goals(file.name or path.stem, limits, file.minutes)
+    return Goals(file.name or path.stem, limits, file.minutes, file.both_senses)
