@@ -109,9 +109,9 @@ class _Bench:
         log = temperature_log(self.scenario, float(motion.t[-1]))
         return Recording(self.scenario.start_ns, t, omega, force, PhaseLog(*phase_changes(motion)), log)
 
-    def possible(self, step: Step) -> bool:
-        """Whether the table can make a step next."""
-        return is_possible(self.table, self.angles, step)
+    def possible(self, *steps: Step) -> bool:
+        """Whether the table can make steps next."""
+        return is_possible(self.table, self.angles, *steps)
 
     def do(self, step: Step) -> None:
         """Make a step the next one of the plan."""

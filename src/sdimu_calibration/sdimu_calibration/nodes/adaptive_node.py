@@ -21,7 +21,8 @@ from pathlib import Path
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S, Menu
+from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S
+from sdimu_calibration.core.adaptive.menu import Menu
 from sdimu_calibration.core.adaptive.question import Decision, Situation, next_move
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError

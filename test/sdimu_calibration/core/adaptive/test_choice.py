@@ -11,6 +11,7 @@ from sdimu_calibration.core.adaptive.choice import most_gain
 from sdimu_calibration.core.adaptive.knowledge import OpenClass, ratios
 from sdimu_calibration.core.adaptive.worth import separation, worth
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.goal_file import load_goals
@@ -18,6 +19,7 @@ from sdimu_calibration.storage.files.goal_file import load_goals
 from .conftest import ACCELERATION, part, perfect_fit
 
 GOALS = load_goals("table33")
+SHORT = Menu(longest_s=12.0)
 BOTH_SENSES = Plan(
     "both senses",
     (30.0,) * 6,
@@ -48,7 +50,9 @@ def test_a_choice_brings_more_a_minute_than_any_other_move(known):
 
 
 def test_only_what_the_table_can_do_is_chosen_and_the_reason_names_a_coefficient(known):
-    choice = choose(known, GOALS, Menu(), 30.0, lambda step: step.turn.axis == "Z" and step.turn.angle_rad < 0.0)
+    choice = choose(
+        known, GOALS, Menu(), 30.0, lambda *steps: steps[-1].turn.axis == "Z" and steps[-1].turn.angle_rad < 0.0
+    )
     assert isinstance(choice, Choice)
     assert choice.step.turn is None or choice.step.turn.axis == "Z"
     assert any(name in choice.text for name in known.limited)
@@ -103,20 +107,56 @@ def test_no_move_is_longer_than_the_time_that_is_left(known):
     assert choice.minutes <= 0.5
 
 
+def with_open(fit: FilterFit, goals: Goals, pair: tuple[str, str]) -> Knowledge:
+    """What is known where the last effect of a model is found at three sigmas of its prior, and another looks alike."""
+    at, count = so_far(fit, [resolve(pair[1])], 30.0), len(fit.names)
+    size = 3.0 * at.setup.sensors.prior[[count - 1, count]] / np.array([1.0, 30.0])
+    one = OpenClass(pair[0], pair[1:], (count - 1, count), size, np.array([3.0]))
+    return replace(fitted(fit, goals), at=at, open=one)
+
+
 def test_an_open_class_is_told_apart_by_a_turn_about_its_own_axis_once_the_limits_hold():
     fit = perfect_fit(BOTH_SENSES, PAIR[:1])
     wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
-    at = so_far(fit, [resolve(PAIR[1])], 30.0)
-    count = len(fit.names)
-    size = 3.0 * at.setup.sensors.prior[[count - 1, count]] / np.array([1.0, 30.0])
-    one = OpenClass(PAIR[0], PAIR[1:], (count - 1, count), size, np.array([3.0]))
-    known = replace(fitted(fit, wide), at=at, open=one)
-    choice = choose(known, wide, Menu(), 30.0)
+    known = with_open(fit, wide, PAIR)
+    at, one = known.at, known.open
+    choice = choose(known, wide, SHORT, 30.0, lambda *steps: len(steps) == 1)
     assert isinstance(choice, Choice)
     assert choice.step.turn.axis == "Y"
     assert f"tells {PAIR[0]} from {PAIR[1]}" in choice.text
     gained = separation(known, one, choice.after.covariance[None]) - separation(known, one, at.covariance[None])
     assert gained[0, 0] > 0.0
+
+
+def test_a_turn_that_shows_nothing_is_chosen_where_it_leads_to_one_that_tells_a_class_apart():
+    # At the end x stands upright, and a slow turn about it changes the azimuth alone; level, it shows as a tilt.
+    pair = ("gyro_scale_asymmetry_x", "gyro_scale_quadratic_x")
+    degrees = (("X", 90.0), ("X", -90.0), ("Z", 90.0), ("Z", -90.0), ("Y", 90.0))
+    turns = tuple(Turn(axis, math.radians(angle), math.radians(10.0)) for axis, angle in degrees)
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+
+    def few(*steps):
+        return all(step.turn.axis in "XZ" and abs(step.turn.angle_rad) < 2.0 for step in steps)
+
+    known = with_open(perfect_fit(Plan("upright", (30.0,) * 6, turns, ACCELERATION), pair[:1]), wide, pair)
+    choice = choose(known, wide, SHORT, 30.0, few)
+    assert isinstance(choice, Choice)
+    assert choice.step.turn.axis != "X"
+    assert "leads to X" in choice.reason
+    assert f"tells {pair[0]} from {pair[1]}" in choice.reason
+    after = choose(known, wide, SHORT, 30.0 - choice.minutes, few, choice.after)
+    assert isinstance(after, Choice)
+    assert after.step.turn.axis == "X"
+    assert after.gain > choice.gain
+
+
+def test_no_turn_leads_to_one_that_the_table_cannot_make_after_it():
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+    known = with_open(perfect_fit(BOTH_SENSES, PAIR[:1]), wide, PAIR)
+    asked = []
+    choice = choose(known, wide, SHORT, 30.0, lambda *steps: asked.append(steps) or len(steps) == 1)
+    assert any(len(steps) == 2 for steps in asked)
+    assert "leads to" not in choice.reason
 
 
 def test_what_has_the_same_signature_is_never_apart():
@@ -172,7 +212,7 @@ def test_turns_in_both_senses_make_the_limit_of_a_scale_factor_hold():
 
 def test_a_turn_in_the_other_sense_is_chosen_where_only_an_asymmetry_keeps_a_limit_from_holding():
     one, goals = scale_known(180.0, 180.0)
-    choice = choose(one, goals, Menu(), 30.0, lambda step: step.turn.axis == "Y")
+    choice = choose(one, goals, Menu(), 30.0, lambda *steps: steps[-1].turn.axis == "Y")
     assert isinstance(choice, Choice)
     assert choice.step.turn.angle_rad < 0.0
 

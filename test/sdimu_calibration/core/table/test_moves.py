@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.table import AxisLimits, RateTable, Step, moves_of, plan_move, steps_of
+from sdimu_calibration.core.table import AxisLimits, RateTable, Step, is_possible, moves_of, plan_move, steps_of
 
 DEG = math.pi / 180
 LIMITS = AxisLimits(50 * DEG, 30 * DEG, angle_rad=400 * DEG, cable_turns=1.0)
@@ -59,6 +59,18 @@ def test_the_cubic_through_the_corners_keeps_the_limits_and_takes_the_time_of_th
 def test_a_step_beyond_the_table_is_refused_with_the_reason(wanted, message):
     with pytest.raises(DataError, match=message):
         plan_move(TABLE, np.zeros(3), wanted)
+
+
+def test_steps_are_possible_only_one_after_the_other():
+    cross, along = step("Z", 90, 10), step("Y", 90, 10)
+    assert is_possible(TABLE, np.zeros(3), cross)
+    assert is_possible(TABLE, np.zeros(3), along, cross)
+    # Behind the first one no gimbal axis is along Y.
+    assert not is_possible(TABLE, np.zeros(3), cross, along)
+    # The cable allows one turn.
+    half = step("X", 200, 10)
+    assert is_possible(TABLE, np.zeros(3), half)
+    assert not is_possible(TABLE, np.zeros(3), half, half)
 
 
 def test_a_turn_is_made_by_the_joint_that_is_along_its_axis_now():

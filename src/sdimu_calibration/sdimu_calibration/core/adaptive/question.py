@@ -11,9 +11,10 @@ from functools import partial
 
 import numpy as np
 
-from sdimu_calibration.core.adaptive.choice import Choice, End, Menu, choose
+from sdimu_calibration.core.adaptive.choice import Choice, End, choose
 from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.adaptive.knowledge import Knowledge, fitted, knowledge
+from sdimu_calibration.core.adaptive.menu import Menu
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
 from sdimu_calibration.core.estimation.fit import Fit

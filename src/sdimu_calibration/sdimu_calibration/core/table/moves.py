@@ -138,18 +138,19 @@ def plan_move(
     raise DataError(f"{step.words}: {'; '.join(reasons)}")
 
 
-def is_possible(table: RateTable, angles: Floats, step: Step) -> bool:
-    """Whether a step is possible from where the table stands.
+def is_possible(table: RateTable, angles: Floats, *steps: Step) -> bool:
+    """Whether steps are possible, one after the other, from where the table stands.
 
     Parameters
     ----------
     angles : ndarray, shape (3,)
         Where the joints are (rad).
-    step : Step
+    *steps : Step
         What is to be done.
     """
     try:
-        plan_move(table, angles, step)
+        for step in steps:
+            angles = np.asarray(plan_move(table, angles, step).target)
     except DataError:
         return False
     return True

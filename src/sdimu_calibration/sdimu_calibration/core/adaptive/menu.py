@@ -1,0 +1,48 @@
+"""Moves that a test chooses from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sdimu_calibration.core.plan import Turn
+
+
+@dataclass(frozen=True)
+class Menu:
+    """Moves to choose from.
+
+    Attributes
+    ----------
+    angles_rad, oblique_rad : tuple of float
+        Signed angles of turns about each axis; those of turns to stops between the axes, from which the gimbals of a
+        table can make few turns: only for what is to be told apart, and back.
+    rate_rad_s : float
+        Mean rate.
+    slow_rad_s : float
+        A second rate, for what is to be told apart: functions of the rate differ between two.
+    shortest_s, longest_s : float
+        Stops.
+    """
+
+    angles_rad: tuple[float, ...] = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
+    oblique_rad: tuple[float, ...] = tuple(math.radians(a) for a in (45.0, -45.0))
+    rate_rad_s: float = math.radians(10.0)
+    slow_rad_s: float = math.radians(2.0)
+    acceleration_rad_s2: float = math.radians(20.0)
+    shortest_s: float = 10.0
+    longest_s: float = 60.0
+
+    def turns(self, apart: bool, square: bool) -> tuple[Turn, ...]:
+        """List the turns to choose from.
+
+        Parameters
+        ----------
+        apart : bool
+            Something is to be told apart.
+        square : bool
+            The test stands along the axes; between them it only goes back, or on.
+        """
+        angles = (*(self.angles_rad if square else ()), *(self.oblique_rad if apart or not square else ()))
+        rates = (self.rate_rad_s, self.slow_rad_s) if apart else (self.rate_rad_s,)
+        return tuple(Turn(axis, angle, rate) for axis in "XYZ" for angle in angles for rate in rates)
