@@ -46,7 +46,13 @@ def test_a_second_run_into_the_same_folder_is_refused_in_one_line(invoke, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("options", "words"), [(("--ask",), "--ask: "), (("--plan", "kim18", "--adaptive", "table33"), "state one")]
+    ("options", "words"),
+    [
+        (("--ask",), "--ask: "),
+        (("--tell", "gyro_bias_x"), "--tell: "),
+        (("--adaptive", "table33", "--tell", "gyro_bias_x"), "two coefficients or more"),
+        (("--plan", "kim18", "--adaptive", "table33"), "state one"),
+    ],
 )
 def test_options_that_exclude_each_other_are_refused(invoke, options, words):
     refused = invoke(*options).exception

@@ -22,6 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from sdimu_calibration.core.adaptive.choice import FIRST_STOP_S
+from sdimu_calibration.core.adaptive.goals import aimed
 from sdimu_calibration.core.adaptive.menu import Menu
 from sdimu_calibration.core.adaptive.question import Decision, Situation, next_move
 from sdimu_calibration.core.arrays import Floats
@@ -58,13 +59,14 @@ class AdaptiveNode:
         declare = Declare(self.node)
         options, _ = declare_opening(self.node)
         goals = load_goals(declare.text("goals", "table33", "limits to reach: name in config/goal or path"))
+        tell = declare.texts("tell", [], "coefficients to tell apart, too: the first from the others")
         model = declare.text("model", "baseline", "model to estimate: name in config/model or path")
         added = tuple(declare.texts("add", [], "effects beyond the model's: names, equations or files"))
         self._out = Path(declare.text("out", ".", "folder of the calibration node, with its journal"))
         # The choices of another test, or of this one before its node was killed: no other file has them.
         if aside := put_aside(self._out / CHOICES):
             self.node.get_logger().warning(f"{self._out / CHOICES}: of an earlier test; kept as {aside}")
-        self._goals, self._models, self._menu = goals, (added,), Menu()
+        self._goals, self._models, self._menu = aimed(goals, tell), (added,), Menu()
         self._worker = Worker(WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False))
         self._driving = Driving(self.node, self._act)
         self.done = self._driving.done

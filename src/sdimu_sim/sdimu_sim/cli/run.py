@@ -62,6 +62,10 @@ class LiveTest:
     adaptive: Annotated[
         str | None, typer.Option(metavar="GOALS", help="Choose each turn by what is known; limits as in config/goal.")
     ] = None
+    tell: Annotated[
+        list[str] | None,
+        typer.Option(metavar="COEFFICIENT", help="With --adaptive: tell the first of these from the others, too."),
+    ] = None
     ask: Annotated[bool, typer.Option(help="With --adaptive: each turn waits for a yes on /adaptive/confirm.")] = False
 
     @property
@@ -98,12 +102,12 @@ def run(
     from sdimu_calibration.core.compiled import still_to_compile
     from sdimu_calibration.report.live_page.record import LiveRecord
 
-    _check_choosing(test.adaptive, test.ask, test.plan)
+    _check_choosing(test)
     page.check()
     options = _parameters(test, world, out)
     duration = _check(options)
     if test.adaptive is not None:
-        duration = _choosing(options, test.adaptive, test.ask)
+        duration = _choosing(options, test.adaptive, test.ask, test.tell or [])
     console = make_console()
     outline = _test(None if test.adaptive else test.followed, test.model, duration)
     record = LiveRecord(outline, str(out.resolve()))
@@ -177,13 +181,14 @@ def _leave(result: Calibration, goals: str | None, end: dict[str, Any] | None) -
         raise typer.Exit(NOT_TRUSTED)
 
 
-def _check_choosing(adaptive: str | None, ask: bool, plan: str | None) -> None:
+def _check_choosing(test: LiveTest) -> None:
     """Refuse options that would have no effect."""
-    if ask and adaptive is None:
-        raise DataError("--ask: only a test that chooses its turns asks: state --adaptive GOALS, too")
-    if plan is not None and adaptive is not None:
+    for option, stated in (("--ask", test.ask), ("--tell", test.tell)):
+        if stated and test.adaptive is None:
+            raise DataError(f"{option}: only for a test that chooses its turns: state --adaptive GOALS, too")
+    if test.plan is not None and test.adaptive is not None:
         raise DataError(
-            f"--plan {plan} and --adaptive {adaptive}: a test follows a plan or chooses its turns; state one"
+            f"--plan {test.plan} and --adaptive {test.adaptive}: a test follows a plan or chooses its turns; state one"
         )
 
 
@@ -240,8 +245,9 @@ def _check(options: dict[str, dict[str, Any]]) -> float:
     return float(motion.t[-1])
 
 
-def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool) -> float:
+def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool, tell: list[str]) -> float:
     """Let the table follow goals, and add the node that chooses them; longest length of the test (s)."""
+    from sdimu_calibration.core.adaptive.goals import aimed
     from sdimu_calibration.storage.files.goal_file import load_goals
 
     options["table"]["follow_goals"] = True
@@ -252,9 +258,10 @@ def _choosing(options: dict[str, dict[str, Any]], goals: str, ask: bool) -> floa
         "table": options["table"]["table"],
         "allow_motion": True,
         "ask": ask,
+        "tell": tell,
         "finish": True,
     }
-    return 60.0 * load_goals(goals).minutes
+    return 60.0 * aimed(load_goals(goals), tell).minutes
 
 
 def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, replace: bool) -> None:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, choose, fitted, so_far
+from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, aimed, choose, fitted, so_far
 from sdimu_calibration.core.adaptive.choice import most_gain
-from sdimu_calibration.core.adaptive.knowledge import OpenClass, ratios
-from sdimu_calibration.core.adaptive.worth import separation, worth
+from sdimu_calibration.core.adaptive.knowledge import ratios
+from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
+from sdimu_calibration.core.adaptive.worth import worth
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.plan import Plan, Turn
@@ -124,8 +125,9 @@ def test_an_open_class_is_told_apart_by_a_turn_about_its_own_axis_once_the_limit
     assert isinstance(choice, Choice)
     assert choice.step.turn.axis == "Y"
     assert f"tells {PAIR[0]} from {PAIR[1]}" in choice.text
-    gained = separation(known, one, choice.after.covariance[None]) - separation(known, one, at.covariance[None])
-    assert gained[0, 0] > 0.0
+    prior = at.setup.sensors.prior
+    before, after = (separation(one, prior, where.covariance[None]) for where in (at, choice.after))
+    assert after[0, 0] > before[0, 0]
 
 
 def test_a_turn_that_shows_nothing_is_chosen_where_it_leads_to_one_that_tells_a_class_apart():
@@ -159,6 +161,45 @@ def test_no_turn_leads_to_one_that_the_table_cannot_make_after_it():
     assert "leads to" not in choice.reason
 
 
+def test_what_the_goals_ask_is_told_apart_though_nothing_was_found():
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+    fit = perfect_fit(BOTH_SENSES)
+    assert isinstance(choose(fitted(fit, wide), wide, SHORT, 30.0), End)
+    goals = aimed(wide, PAIR)
+    known = fitted(fit, goals)
+    assert known.named == ()
+    choice = choose(known, goals, SHORT, 30.0, lambda *steps: len(steps) == 1)
+    assert isinstance(choice, Choice)
+    assert choice.step.turn.axis == "Y"
+    assert f"tells {PAIR[0]} from {PAIR[1]}" in choice.text
+
+
+def test_what_two_rates_in_both_senses_tell_apart_is_lacking_no_longer():
+    turns = tuple(Turn("Y", math.radians(angle), math.radians(rate)) for rate in (10.0, 2.0) for angle in (90.0, -90.0))
+    fit = perfect_fit(Plan("two rates", (30.0,) * 5, turns, ACCELERATION))
+    assert fitted(fit, aimed(GOALS, PAIR)).open is None
+    # About x nothing was turned.
+    other = ("gyro_scale_asymmetry_x", "gyro_scale_quadratic_x")
+    assert fitted(fit, aimed(GOALS, other)).open.alike == other[1:]
+
+
+def test_what_the_model_has_already_is_told_apart_with_its_own_column():
+    fit = perfect_fit(BOTH_SENSES, PAIR[:1])
+    known = fitted(fit, aimed(GOALS, PAIR))
+    assert known.open.columns == (fit.names.index(PAIR[0]), len(fit.names))
+    both = fitted(fit, aimed(GOALS, ("gyro_scale_asymmetry", PAIR[1])))
+    assert sorted(both.at.names) == sorted(set(both.at.names))
+
+
+@pytest.mark.parametrize(
+    ("tell", "message"),
+    [(PAIR[:1], "two coefficients or more"), ((*PAIR, PAIR[0]), "named twice"), ((PAIR[0], "gyro"), "unknown effect")],
+)
+def test_what_is_no_class_is_refused(tell, message):
+    with pytest.raises(DataError, match=message):
+        aimed(GOALS, tell)
+
+
 def test_what_has_the_same_signature_is_never_apart():
     fit = perfect_fit(part(4), PAIR[:1])
     at = so_far(fit, [resolve(PAIR[1])], 30.0)
@@ -173,7 +214,7 @@ def test_what_has_the_same_signature_is_never_apart():
     J = np.array([[1.0 / s2, 1.0 / s2], [1.0 / s2, 1.0 / s2]]) + np.eye(2) / prior**2
     same[np.ix_([count - 1, count], [count - 1, count])] = np.linalg.inv(J)
     known.at.setup.sensors.prior[count] = prior
-    assert separation(known, twin, same[None])[0, 0] < 1e-6 * size[0] ** 2 / s2
+    assert separation(twin, known.at.setup.sensors.prior, same[None])[0, 0] < 1e-6 * size[0] ** 2 / s2
 
 
 def test_ratios_are_sigmas_in_the_reported_frame_over_their_limits(first_stop):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.plan_search.next_turn import named_class
 from sdimu_calibration.core.recording import DataError
 
 
@@ -25,12 +26,15 @@ class Goals:
     both_senses : bool
         A limit of a gyro's scale factor holds only where an asymmetry that the test has not shown, of the size that
         physics gives it, cannot hide more: turns about each axis in both senses.
+    tell : tuple of str
+        Coefficients or effects: the first is to be told from the others, each of the size that physics gives it.
     """
 
     name: str
     limits: Mapping[str, float]
     minutes: float
     both_senses: bool = True
+    tell: tuple[str, ...] = ()
 
     def of(self, names: Sequence[str], frame: str) -> tuple[Bools, Floats]:
         """Find the coefficients that have a limit.
@@ -54,6 +58,19 @@ class Goals:
             there = ", ".join(self.limits)
             raise DataError(f"goals '{self.name}': the model has no coefficient with a limit (limits: {there})")
         return limited, limit[limited]
+
+
+def aimed(goals: Goals, tell: Sequence[str]) -> Goals:
+    """Let goals ask to tell coefficients apart, too; by none they stay as they are.
+
+    Parameters
+    ----------
+    tell : sequence of str
+        As of `Goals`.
+    """
+    if tell:
+        named_class(tell)
+    return replace(goals, tell=tuple(tell))
 
 
 def _effect(coefficient: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.adaptive.goals import Goals
+from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
 from sdimu_calibration.core.adaptive.so_far import SoFar, so_far
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
@@ -20,6 +21,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
+from sdimu_calibration.core.plan_search.next_turn import named_class
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Option
@@ -30,31 +32,6 @@ _ROOM = 30.0
 """Prior of a candidate over the size that physics gives it (1): so wide that the data decide its size."""
 CLEAR = 2.0
 """Difference of log Bayes factors (1) beyond the one that tells two candidates apart: what noise may take back."""
-
-
-@dataclass(frozen=True)
-class OpenClass:
-    """An effect that was found, and those that the data cannot tell from it.
-
-    Attributes
-    ----------
-    found : str
-        Label.
-    alike : tuple of str, length k
-        Labels; the nearest first.
-    columns : tuple of int, length k + 1
-        Parameters of `SoFar`: that of `found`, then those of `alike`.
-    size : ndarray, shape (k + 1,)
-        Estimate of each by itself (SI).
-    needed : ndarray, shape (k,)
-        Difference of log Bayes factors (1) that is lacking before `found` is told from each.
-    """
-
-    found: str
-    alike: tuple[str, ...]
-    columns: tuple[int, ...]
-    size: Floats
-    needed: Floats
 
 
 @dataclass(frozen=True)
@@ -71,7 +48,7 @@ class Knowledge:
     noise : ndarray, shape (c,)
         Sigma in the noise of the fit over that in white noise (1).
     open : OpenClass or None
-        The class to be told apart; None where none is open.
+        The class to be told apart, by the data or else by the goals; None where none is open.
     named : tuple of str
         Labels of everything that was found.
     """
@@ -123,15 +100,44 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
         raise DataError(
             f"a {fit.estimator} fit says nothing of the next turn of a table: choose another {Option.ESTIMATOR}"
         )
-    at = so_far(fit, alike, _ROOM, _hiding(fit, alike) if goals.both_senses else ())
+    along = alike or _to_tell(fit, goals)
+    at = so_far(fit, along, _ROOM, _hiding(fit, along) if goals.both_senses else ())
     limited, limit = goals.of(fit.names, fit.model.body_frame)
     # The doubt about the model is no noise: what is too small to be found stays so, however long a test is.
     ratio = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited]) / limit
     count = at.own
     white = ratios(at, goals, _without(at.covariance, slice(count, None)))
-    unseen = ratios(at, goals, _without(at.covariance, slice(count, count + len(alike)))) / white
+    unseen = (
+        ratios(at, goals, _without(at.covariance, slice(count, count + sum(len(e.parameters) for e in along)))) / white
+    )
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
-    return Knowledge(at, names, ratio * unseen, np.maximum(ratio / white, 1.0), None, named, Verdict.CONSISTENT)
+    aim = None if alike else _aim(at, goals)
+    return Knowledge(at, names, ratio * unseen, np.maximum(ratio / white, 1.0), aim, named, Verdict.CONSISTENT)
+
+
+def _to_tell(fit: Fit, goals: Goals) -> tuple[Effect, ...]:
+    """Find what the goals ask to tell apart, as far as the model has it not."""
+    effects = named_class(goals.tell)[0] if goals.tell else []
+    left = [(e, tuple(p.name for p in e.parameters if p.name not in fit.names)) for e in effects]
+    return tuple(e if len(names) == len(e.parameters) else e.only(names) for e, names in left if names)
+
+
+def _aim(at: SoFar, goals: Goals) -> OpenClass | None:
+    """Class that the goals ask to tell apart: the first from all others, each of the size that physics gives it.
+
+    Returns
+    -------
+    OpenClass or None
+        None where that would be told by now.
+    """
+    if not goals.tell:
+        return None
+    names, prior = named_class(goals.tell)[1], at.setup.sensors.prior
+    columns = tuple(at.names.index(name) for name in names)
+    size = np.array([prior[c] / (1.0 if c < at.own else _ROOM) for c in columns])
+    one = OpenClass(names[0], names[1:], columns, size, np.zeros(len(names) - 1))
+    needed = INDISTINGUISHABLE + CLEAR - separation(one, prior, at.covariance[None])[0]
+    return replace(one, needed=needed) if (needed > 0.0).any() else None
 
 
 def _hiding(fit: Fit, alike: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.adaptive.goals import Goals
-from sdimu_calibration.core.adaptive.knowledge import Knowledge, OpenClass, ratios
+from sdimu_calibration.core.adaptive.knowledge import Knowledge, ratios
+from sdimu_calibration.core.adaptive.open_class import separation
 from sdimu_calibration.core.arrays import Bools, Floats
 
 
@@ -67,33 +68,6 @@ def worth(known: Knowledge, goals: Goals, covariance: Floats, since: Floats) -> 
     lacking = np.log(np.maximum(ratio, 1.0)).sum(axis=1)
     if known.open is None:
         return Worth(ratio, np.zeros((len(ratio), 0)), lacking)
-    before = separation(known, known.open, since[None])
-    apart = separation(known, known.open, covariance) - before
+    prior = known.at.setup.sensors.prior
+    apart = separation(known.open, prior, covariance) - separation(known.open, prior, since[None])
     return Worth(ratio, apart, lacking + np.maximum(known.open.needed - apart, 0.0).sum(axis=1))
-
-
-def separation(known: Knowledge, one: OpenClass, covariance: Floats) -> Floats:
-    """Half the square of the significance by which each look-alike differs from what was found.
-
-    Parameters
-    ----------
-    one : OpenClass
-        With a look-alikes.
-    covariance : ndarray, shape (k, p, p)
-        SI.
-
-    Returns
-    -------
-    ndarray, shape (k, a)
-        Mean difference of log-likelihoods (1), by the one of the two that shows less.
-    """
-    rows = np.array(one.columns)
-    prior = known.at.setup.sensors.prior[rows]
-    C = covariance[:, rows][:, :, rows] / np.outer(prior, prior)
-    J = np.linalg.inv(C) - np.eye(len(rows))
-    size = (one.size / prior) ** 2
-    own = np.maximum(np.diagonal(J, axis1=1, axis2=2), 1e-12)
-    across = J[:, 0, 1:] ** 2
-    first = size[0] * (own[:, :1] - across / own[:, 1:])
-    other = size[1:] * (own[:, 1:] - across / own[:, :1])
-    return np.asarray(0.5 * np.maximum(np.minimum(first, other), 0.0))

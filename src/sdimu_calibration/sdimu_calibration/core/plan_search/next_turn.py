@@ -93,12 +93,7 @@ def next_turn(
     tuple of NextTurn
         Best first: by gain a minute.
     """
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
-    names = tuple(p.name for e in effects for p in e.parameters)
-    if len(names) < 2:
-        raise DataError("nothing to tell apart: name two coefficients or more")
-    if len(set(names)) < len(names):
-        raise DataError(f"{next(n for n in names if names.count(n) > 1)}: named twice; name each coefficient once")
+    effects, names = named_class(alike)
     have = {p for name in asked.model.effects for p in _parameters(name)}
     more = [e for e in effects if not {p.name for p in e.parameters} <= have]
     # A model names its effects; `imu_model.build` takes an effect itself as well.
@@ -120,6 +115,23 @@ def next_turn(
         if progress is not None:
             progress("next turn", count / len(extras))
     return tuple(sorted(out, key=lambda one: -one.gain))
+
+
+def named_class(alike: Sequence[str | Effect]) -> tuple[list[Effect], tuple[str, ...]]:
+    """Find the effects that are to be told apart, and the names of their coefficients.
+
+    Parameters
+    ----------
+    alike : sequence of str or Effect
+        As for `next_turn`.
+    """
+    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
+    names = tuple(p.name for e in effects for p in e.parameters)
+    if len(names) < 2:
+        raise DataError("nothing to tell apart: name two coefficients or more")
+    if len(set(names)) < len(names):
+        raise DataError(f"{next(n for n in names if names.count(n) > 1)}: named twice; name each coefficient once")
+    return effects, names
 
 
 def untold(ranked: Sequence[NextTurn], alike: Sequence[str | Effect]) -> str:
