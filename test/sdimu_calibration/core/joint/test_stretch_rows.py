@@ -20,7 +20,7 @@ ACCEL = NoiseTerm("accel", RANDOM_WALK, 0.0, 2e-4, axes=(0, 2))
 
 
 def test_turns_are_trusted_as_their_noise_allows_and_dwells_as_in_white_noise():
-    """Against the covariance of all rows written out; the errors that turns make in a coefficient come back otherwise."""
+    """Against the covariance of all rows written out."""
     (member,) = unit_set(3, [short(stops=6)]).members
     fit = solve(member.open(), load_model("baseline"))
     evidence = fit.bare
