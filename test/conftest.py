@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sharing import longest_first, sharing
+from sharing import DOMAINS_A_RUN, longest_first, sharing
 from tiers import COLLECTED, is_thorough
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
@@ -31,7 +31,7 @@ INTERVAL_NS = 10_000_000
 # another domain. Domains 215 to 232 have ports beyond those that Linux gives to clients, and `sdimu run` takes none of
 # them unless it is told to.
 _WORKER = int("".join(filter(str.isdigit, os.environ.get("PYTEST_XDIST_WORKER", "0"))) or 0)
-os.environ["ROS_DOMAIN_ID"] = str(int(os.environ.get("SDIMU_FIRST_DOMAIN", "215")) + _WORKER % 4)
+os.environ["ROS_DOMAIN_ID"] = str(int(os.environ.get("SDIMU_FIRST_DOMAIN", "215")) + _WORKER % DOMAINS_A_RUN)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 

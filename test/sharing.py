@@ -27,6 +27,8 @@ TOGETHER = {
 }
 """Files that go to the worker of another one, with which they share a whole run over DDS."""
 
+DOMAINS_A_RUN = 4
+"""Number of ROS domains that a parallel run of tests takes, from its first one; with more workers some share."""
 LONGEST = (
     "test/browser/test_workbench_in_a_browser.py",
     "test/browser/test_workbench_page_in_a_browser.py",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from mutants import CORE, MUTANTS
-from sharing import APART, LONGEST, TOGETHER, scope_of
+from sharing import APART, DOMAINS_A_RUN, LONGEST, TOGETHER, scope_of
 from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
 
 from sdimu_calibration.cli.processes import DOMAINS, STATED
@@ -67,7 +67,7 @@ def test_targets_that_run_side_by_side_share_no_ros_domain():
     beside = {"thorough-nodes", "thorough-rest", "colcon", "other-blas"}
     assert beside | {"docs"} == set(ci.rpartition("--output-sync=target ")[2].split())
     assert set(first) == beside
-    taken = [number + worker for number in first.values() for worker in range(4)]
+    taken = [number + worker for number in first.values() for worker in range(DOMAINS_A_RUN)]
     taken.append(int(re.findall(r"ROS_DOMAIN_ID=(\d+)", make)[0]))
     assert len(set(taken)) == len(taken)
     assert not [number for number in taken if number in DOMAINS or number not in STATED]

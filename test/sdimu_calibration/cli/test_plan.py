@@ -84,7 +84,9 @@ def test_minutes_that_leave_no_turn_leave_no_plan(tmp_path, capsys):
 def test_what_a_short_plan_does_not_show_is_told(tmp_path, capsys, minutes, told):
     plan(plan="kim18", minutes=minutes, tries=1, out=tmp_path / "found.yaml")
     said = " ".join(capsys.readouterr().out.split())
-    assert ("it shows nothing of gyro_scale, gyro_misalignment, gyro_mass_unbalance, accel_bias" in said) == told
+    assert (
+        "it leaves a coefficient or more of gyro_scale, gyro_misalignment, gyro_mass_unbalance, accel_bias" in said
+    ) == told
     assert load_plan(tmp_path / "found.yaml").turns
 
 

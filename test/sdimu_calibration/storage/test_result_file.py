@@ -175,6 +175,11 @@ def _damaged(tmp_path, key, value):
         (("covariance", 1), [1.0], "covariance: a list of numbers"),
         (("covariance", 0, 0), -1.0, "covariance: a variance is below zero"),
         (("covariance", 0, 1), 1e3, "covariance: is not symmetric"),
+        (
+            ("covariance",),
+            [[0.0, 1e3, 0.0], [1e3, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            "covariance: a covariance stands beside",
+        ),
         (("covariance",), [[1.0] * 3, [1.0, 1e-3, 1.0], [1.0] * 3], "covariance: a correlation is beyond 1"),
         (("history", "stop"), [0.5] * 7, "history.stop: a list of numbers"),
         (("history", "stop"), [-1e308] * 7, "history.stop: a list of numbers"),
@@ -199,9 +204,9 @@ def test_a_recording_may_begin_an_interval_before_its_first_stamp_of_zero(tmp_pa
             read_result(path)
 
 
-@pytest.mark.parametrize("key", [("coefficients", 1, "value"), ("covariance", 1, 1)])
+@pytest.mark.parametrize("key", [("coefficients", 1, "value"), ("covariance", 1, 1), ("covariance", 1, 2)])
 def test_a_value_that_is_no_number_is_read_but_not_used(tmp_path, key):
     path = _damaged(tmp_path, key, None)
     assert read_result(path).names[1] == "gyro_bias_y"
-    with pytest.raises(DataError, match=r"result\.json: gyro_bias_y: its value or variance is no number"):
+    with pytest.raises(DataError, match=r"result\.json: gyro_bias_y: its value or a covariance is no number"):
         read_judged_result(path)

@@ -220,7 +220,8 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
     if summary.assumed:
         line(
             console,
-            f"this plan does not show, and the coefficients take as absent: {taken_for_granted(summary.assumed)}",
+            "shown weakly or not at all by this plan, and taken as absent by the coefficients: "
+            f"{taken_for_granted(summary.assumed)}",
         )
     if summary.reached:
         line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")

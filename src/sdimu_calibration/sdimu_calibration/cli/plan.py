@@ -225,8 +225,16 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
         if not limits and minutes is None:
             minutes = start.duration_s / 60.0
         found = search(start, asked.question, able, Goal(limits, minutes), allowed.tries, progress)
-    title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
     known = already(asked.question) if before else None
+    if start.turns and not found.plan.turns:
+        say(
+            console,
+            f"no plan with the attitudes of {start.name} that turns the IMU fits in --minutes {minutes:g}; no file "
+            "written (more --minutes, shorter --dwells, faster --rates, or a --plan with fewer stops)",
+        )
+        answer(_content(start, known, first, found, limits, None), request.as_json)
+        return
+    title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
     print_table(console, *_table(start, known, first, found, limits), title)
     if before:
         tell_gain(console, start, found, before.open, (already(asked.question), first, found.bounds))
@@ -237,14 +245,6 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
             f"no plan with the attitudes of {start.name} fits in --minutes {minutes:g}: the shortest takes "
             f"{found.minutes:.1f} min (shorter --dwells, faster --rates, or a --plan with fewer stops)",
         )
-    if start.turns and not found.plan.turns:
-        say(
-            console,
-            f"no plan with the attitudes of {start.name} that turns the IMU fits in --minutes {minutes:g}; no file "
-            "written (more --minutes, shorter --dwells, faster --rates, or a --plan with fewer stops)",
-        )
-        answer(_content(start, known, first, found, limits, None), request.as_json)
-        return
     if found.plan is start:
         say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
         answer(_content(start, known, first, found, limits, None), request.as_json)
@@ -260,7 +260,7 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
     command(console, joined(["sdimu", "predict", "--plan", str(out), "--imu", asked.imu, "--site", asked.site]))
     unseen = found.bounds.unseen
     if unseen:
-        say(console, f"of one axis or more it shows nothing of {', '.join(unseen)}: the sigma stays that of the prior")
+        say(console, f"it leaves a coefficient or more of {', '.join(unseen)} at the prior (within 1 %)")
     answer(_content(start, known, first, found, limits, out), request.as_json)
 
 

@@ -135,7 +135,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     printed(folder / "report.html")
     say(console, f"{found.verdict}: {found.sentence}")
     if found.error_without is not None:
-        fell = f"{found.error_without:.3f} -> {held_out(found.after):.3f}"
+        fell = " -> ".join(dict.fromkeys(f"{error:.3f}" for error in (found.error_without, held_out(found.after))))
         say(console, f"held-out error, a recording left out at a time, in one noise: {fell}")
     _show(console, after, diagnosed=True)
     print_advice(console, found.advice, about)

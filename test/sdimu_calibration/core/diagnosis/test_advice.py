@@ -125,7 +125,7 @@ def test_stops_on_the_diagonal_are_advised_where_the_plan_has_none(oblique, kind
 def test_the_minutes_of_a_stay_are_those_of_all_that_is_told():
     (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
     what = telling_turn(candidate.effect, PlanSeen((TurnSeen(0, 0, 1.0, 0.1, 0.3),), True, 2.0))
-    assert sentence(what) == "stay at the last stop for 20 min more, then repeat the first stop (23 min)"
+    assert sentence(what) == "stay at the last stop for 20 min more, then repeat the first stop (23 min together)"
 
 
 def test_an_equation_has_no_variant_that_its_brackets_would_hide():

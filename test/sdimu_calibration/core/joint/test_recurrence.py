@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.advice import Advice
+from sdimu_calibration.core.advice import Kind as Do
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, TEMPERATURE, TIME, Leftovers, leftovers, likeness
 from sdimu_calibration.core.joint.recurrence import Kind, Recurrence, recurrence
@@ -120,7 +122,13 @@ def test_recordings_in_the_same_order_do_not_tell_attitude_from_time():
     assert found is not None
     assert (found.answer, found.apart) == ((ATTITUDE, TIME), False)
     assert "the order of the stops" in answer_in_words(found, True)
-    assert "--backwards" in sentence(next_steps(found)[0])
+    # Of the time it has no figures: it comes along as the order of the stops is that of the attitudes.
+    assert answer_in_words(found, True).count("sigma where chance ends") == sum(
+        kind.score > found.limit for kind in found.kinds
+    )
+    for function in (False, True):
+        assert "--backwards" in sentence(next_steps(found, function)[0])
+    assert next_steps(replace(found, answer=(ATTITUDE,), apart=True), True) == [Advice(Do.TRY_FORCE_EQUATION)]
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from sdimu_calibration.storage.files.advice_words import sentence
 @pytest.mark.parametrize(
     ("after", "begins"),
     [
-        (1.6, "no single turn tells a from b (1.6 sigma with the best one, 3 tell): search a whole plan"),
+        (1.6, "no single turn tells a from b (the best one reaches 1.6 sigma, 3 are needed): search a whole plan"),
         (4.0, "to tell a from b, record once more: rests of 100 s, and between them turn X +180 deg at 10 deg/s"),
     ],
     ids=["too little", "enough"],

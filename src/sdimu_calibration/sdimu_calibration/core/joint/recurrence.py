@@ -7,7 +7,8 @@ likelihood. With ``x = (I + G K)^-1 s``, whose covariance is ``F = (I + G K)^-1 
 to all recordings is ``x' C x``, C the likeness of places in *different* recordings; over that in the same recordings it
 is a correlation. Where it is larger than chance makes it, by simulation of x from F, leftovers come back. Of two kinds
 that both do, one is needed where it is still larger with the other one in the hypothesis; where neither is, the
-recordings cannot tell them apart.
+recordings cannot tell them apart. Nor can they where the dwells of one kind have the partners that they have in
+another: both are then the answer, whatever the score of the other one.
 
 Sources: X. Lin, "Variance component testing in generalised linear models with random effects", Biometrika 84 (1997)
 (score test of a variance); H. Zhou et al., "MM algorithms for variance components models", J. Comput. Graph. Stat. 28
@@ -139,8 +140,10 @@ def recurrence(left: Leftovers) -> Recurrence | None:
     left = left.only(np.flatnonzero(np.isin(left.sensor, loud)))
     alone = _tested(left, main, ())
     found = [kind for kind in KINDS if alone.largest(kind) > alone.limit]
-    with_same = [k for k in KINDS if k in found or (np.isfinite(alone.largest(k)) and _in_same_order(left, k, found))]
-    answer, apart = (with_same, len(with_same) < 2) if len(found) < 2 else _needed(left, main, found)
+    needed, apart = (found, True) if len(found) < 2 else _needed(left, main, found)
+    seen = [kind for kind in KINDS if np.isfinite(alone.largest(kind))]
+    answer = [kind for kind in seen if kind in needed or _in_same_order(left, kind, needed)]
+    apart = apart and len(answer) == len(needed)
     return Recurrence(
         tuple(answer),
         apart,

@@ -30,14 +30,16 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     what = "What stays unexplained" if unexplained else "What the model leaves in the stops"
     if found.answer:
         by_kind = {k.kind: k for k in found.kinds}
-        seen = "; ".join(_figures(by_kind[kind], found.limit) for kind in found.answer)
+        # A kind that comes along with another one, as the order of the stops is one, has no figures that say so.
+        shown = [by_kind[kind] for kind in found.answer if by_kind[kind].score > found.limit]
+        seen = "; ".join(_figures(kind, found.limit) for kind in shown)
         if not found.apart:
             return (
-                f"{what} comes back at the same {_listed(found.answer, 'or')} ({seen}): the order of the stops in "
+                f"{what} comes back at the same {listed(found.answer, 'or')} ({seen}): the order of the stops in "
                 "these recordings does not tell which."
             )
         return (
-            f"{what} comes back at the same {_listed(found.answer, 'and')} ({seen}): it belongs to "
+            f"{what} comes back at the same {listed(found.answer, 'and')} ({seen}): it belongs to "
             f"{' and '.join(_BELONGS[kind] for kind in found.answer)}."
         )
     if found.doubtful:
@@ -50,7 +52,7 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
         return f"Whether {what[0].lower()}{what[1:]} comes back cannot be told: the recordings share too few stops."
     of_each = ": it belongs to each run" if {ATTITUDE, TIME} <= set(found.told) else ""
     where = f"{' in the stops' if unexplained else ''} ({', '.join(found.sensors)})"
-    return f"{what}{where} does not come back at the same {_listed(found.told, 'or')}{of_each}."
+    return f"{what}{where} does not come back at the same {listed(found.told, 'or')}{of_each}."
 
 
 def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]:
@@ -61,7 +63,7 @@ def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]
     function : bool
         An unknown function of the attitude explains it, whether or not the stops come back.
     """
-    if function:
+    if function and (found is None or found.apart or not found.answer):
         return [_NEXT[ATTITUDE]]
     if found is None:
         return []
@@ -78,6 +80,7 @@ def _figures(one: Kind, limit: float) -> str:
     return f"{where}correlation {one.correlation:.2f}, {one.score:.1f} sigma where chance ends at {limit:.1f}"
 
 
-def _listed(kinds: Sequence[str], between: str) -> str:
+def listed(kinds: Sequence[str], between: str) -> str:
+    """Name kinds in their order, the last two with a word between them."""
     words = [_WORDS[kind] for kind in KINDS if kind in kinds]
     return f" {between} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

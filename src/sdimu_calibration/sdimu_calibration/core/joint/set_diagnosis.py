@@ -28,7 +28,7 @@ from sdimu_calibration.core.joint.function_fit import Beside, needless, with_fun
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
-from sdimu_calibration.core.joint.recurrence_words import answer_in_words, next_steps
+from sdimu_calibration.core.joint.recurrence_words import answer_in_words, listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance, own_values
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
@@ -178,7 +178,7 @@ def diagnose_set(
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)
         refused += tuple(f for f in findings if f.tag in needed_not)
-        why = f"{_explained(again.sensors, needed_not)} {why}".strip()
+        why = f"{_explained(again, needed_not)} {why}".strip()
         after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
     test = base_fit(found.after).test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
@@ -221,13 +221,13 @@ def _beside_function(
     return replace(found, after=beside.fit, standing=standing_beside(beside.fit, found.chosen)), beside, labels
 
 
-def _explained(sensors: Sequence[str], labels: Sequence[str]) -> str:
+def _explained(again: Recurrence, labels: Sequence[str]) -> str:
     """Say what an unknown function explains; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
     too = f" It also explains {', '.join(names)}: not told." if names else ""
-    return (
-        f"An unknown function of the attitude in {' and '.join(sensors)}, the same in all recordings, explains it.{too}"
-    )
+    of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
+    where = " and ".join(again.sensors)
+    return f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.{too}"
 
 
 def _error_without(found: SetSearch) -> float | None:

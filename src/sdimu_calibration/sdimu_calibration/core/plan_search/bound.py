@@ -19,7 +19,7 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 _FIXED = 1e-6
 """Share of its prior below which a sigma is zero by definition of the body frame: above rounding."""
 _UNSEEN = 0.99
-"""Share of its prior from which a sigma tells nothing (1): what a plan shows is at most a hundredth of it."""
+"""Share of its prior from which a sigma tells nothing (1): a plan that shows less of it leaves it as it was."""
 
 
 @dataclass(frozen=True)

@@ -149,7 +149,9 @@ class Prior:
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
             members, next_one = np.array(of_model, dtype=np.int64), self._next_one(self.named(of_model))
-            kept[of_model] = odds = odds_beside(next_one, self._alike, self.repeats, members, KIN, MOST_DRIFTS)
+            odds = odds_beside(next_one, self._alike, self.repeats, members, KIN, MOST_DRIFTS)
+            odds.flags.writeable = False
+            kept[of_model] = odds
         return odds
 
     def apart(self, base: Sequence[int], use: Ints) -> tuple[Ints, Ints]:

@@ -50,10 +50,11 @@ def check_no_source(path: Path, option: str, sources: Iterable[Path] = ()) -> No
 
 
 def results_folder(folder: str | Path) -> Path:
-    """Return a folder of results; a recording is refused: what is in its folder is taken for a part of it."""
+    """Return a folder of results; a folder of a recording, or one in it, is refused."""
     folder = Path(folder)
-    if (folder / METADATA).is_file():
-        raise DataError(f"{folder}: is a recording; choose another folder for the results (--out)")
+    for place in (folder, *folder.resolve().parents):
+        if (place / METADATA).is_file():
+            raise DataError(f"{place}: is a recording; choose another folder for the results (--out)")
     return folder
 
 

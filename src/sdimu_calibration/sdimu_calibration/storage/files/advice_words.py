@@ -127,7 +127,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     ),
     Kind.TURN_BACK: lambda minutes: f"add a turn of 180 deg about that axis in the other sense ({minutes:.0f} min)",
     Kind.STAY_AND_RETURN: lambda stay, again: (
-        f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({stay + again:.0f} min)"
+        f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({stay + again:.0f} min together)"
     ),
     Kind.REST_ON_DIAGONAL: lambda minutes: (
         f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({minutes:.0f} min), or run the plan "
@@ -174,8 +174,8 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "whole plan"
     ),
     Kind.NO_TURN_TELLS: lambda label, others, best, tells: (
-        f"no single turn tells {label} from {', '.join(others)} ({best:.1f} sigma with the best one, {tells:.0f} tell)"
-        ": search a whole plan for the next recording"
+        f"no single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
+        "are needed): search a whole plan for the next recording"
     ),
     Kind.ONE_BY_ONE: lambda: (
         "diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first"

@@ -239,12 +239,12 @@ def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
     Raises
     ------
     DataError
-        Where a value or a variance is no finite number: nothing can be corrected with it.
+        Where a value, a variance or a covariance is no finite number: nothing can be corrected with it.
     """
     path, result, verdict = _read(path)
-    for name, value, variance in zip(result.names, result.values, np.diag(result.covariance), strict=True):
-        if not np.isfinite(value + variance):
-            raise DataError(f"{path}: {name}: its value or variance is no number; calibrate again")
+    for name, value, row in zip(result.names, result.values, result.covariance, strict=True):
+        if not np.isfinite(value + row).all():
+            raise DataError(f"{path}: {name}: its value or a covariance is no number; calibrate again")
     judged = (
         [f"its diagnosis ended as '{verdict}': the model is wrong or the data are, and no effect mends it"]
         if verdict in UNTRUSTED_VERDICTS
@@ -311,6 +311,9 @@ def _check_covariance(covariance: Floats) -> None:
     sigma = np.sqrt(variance)
     off = _SLACK_OF_CORRELATION * np.outer(sigma, sigma)
     known = off > 0.0
+    of_nothing = (np.abs(covariance) > 0.0) & ~(known | np.isnan(sigma[:, None] * sigma))
+    if of_nothing.any():
+        raise ValueError("covariance: a covariance stands beside a variance of zero")
     if (np.abs(covariance - covariance.T) > off)[known].any():
         raise ValueError("covariance: is not symmetric")
     if (np.abs(covariance) > np.outer(sigma, sigma) + off)[known].any():
