@@ -99,6 +99,7 @@ def test_results_go_into_no_folder_where_they_would_replace_a_file_of_the_user(s
     "line",
     [
         "calibrate BAG --out small",
+        "calibrate BAG --out small/results",
         "calibrate BAG --out inner/link",
         "calibrate BAG BAG --out small",
         "diagnose BAG --out small",
