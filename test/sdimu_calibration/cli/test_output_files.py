@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from sdimu_calibration.cli import main as cli
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.config import config_folder
 from sdimu_calibration.storage.files.effect_file import effect_files
 
@@ -120,6 +122,14 @@ def test_no_results_are_written_into_a_recording(said, tmp_path, line):
     assert (status, err.count("\n")) == (1, 1)
     assert "is a recording; choose another folder for the results" in err
     assert sorted((tmp_path / "small").iterdir()) == before
+
+
+def test_metadata_of_another_program_make_no_recording(tmp_path):
+    (tmp_path / "metadata.yaml").write_text("title: a project\n")
+    assert results_folder(tmp_path / "out") == tmp_path / "out"
+    (tmp_path / "part_0.mcap").touch()
+    with pytest.raises(DataError, match="is a recording"):
+        results_folder(tmp_path / "out")
 
 
 def test_files_among_keys_of_effects_are_found():

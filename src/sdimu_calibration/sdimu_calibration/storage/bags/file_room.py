@@ -53,9 +53,15 @@ def results_folder(folder: str | Path) -> Path:
     """Return a folder of results; a folder of a recording, or one in it, is refused."""
     folder = Path(folder)
     for place in (folder, *folder.resolve().parents):
-        if (place / METADATA).is_file():
+        if _is_recording(place):
             raise DataError(f"{place}: is a recording; choose another folder for the results (--out)")
     return folder
+
+
+def _is_recording(folder: Path) -> bool:
+    """Whether a folder is a bag: metadata beside messages; other programs, too, have files of that name."""
+    has_metadata = (folder / METADATA).is_file()
+    return has_metadata and any(not {*one.suffixes}.isdisjoint(BAG_SUFFIXES) for one in folder.iterdir())
 
 
 def check_own_file(path: Path, heads: tuple[str, ...], sources: Iterable[Path] = ()) -> None:
