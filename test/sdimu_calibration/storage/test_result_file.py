@@ -181,6 +181,11 @@ def _damaged(tmp_path, key, value):
             "covariance: a covariance stands beside",
         ),
         (("covariance",), [[1.0] * 3, [1.0, 1e-3, 1.0], [1.0] * 3], "covariance: a correlation is beyond 1"),
+        (
+            ("covariance",),
+            [[1.0, -0.9, -0.9], [-0.9, 1.0, -0.9], [-0.9, -0.9, 1.0]],
+            "covariance: a variance is below zero along some direction",
+        ),
         (("history", "stop"), [0.5] * 7, "history.stop: a list of numbers"),
         (("history", "stop"), [-1e308] * 7, "history.stop: a list of numbers"),
         (("history", "dwell"), [2] * 7, "history.dwell: a list of numbers"),

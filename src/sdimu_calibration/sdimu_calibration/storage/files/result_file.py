@@ -55,6 +55,7 @@ from sdimu_calibration.storage.files.result_model import (
     complete,
     read_model,
 )
+from sdimu_calibration.storage.files.semidefinite import is_semidefinite
 
 FORMAT: Final = "sdimu-result/1"
 PATHS = ("site_file", "imu_file")
@@ -318,6 +319,10 @@ def _check_covariance(covariance: Floats) -> None:
         raise ValueError("covariance: is not symmetric")
     if (np.abs(covariance) > np.outer(sigma, sigma) + off)[known].any():
         raise ValueError("covariance: a correlation is beyond 1")
+    some = np.flatnonzero(variance > 0.0)
+    of_some = covariance[np.ix_(some, some)]
+    if np.isfinite(of_some).all() and not is_semidefinite(of_some, _SLACK_OF_CORRELATION):
+        raise ValueError("covariance: a variance is below zero along some direction")
 
 
 def _whole_history(history: History, p: int) -> History:

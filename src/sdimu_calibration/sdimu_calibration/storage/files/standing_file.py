@@ -15,6 +15,7 @@ from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.files.json_file import entry, read_json
 from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, wrong
+from sdimu_calibration.storage.files.semidefinite import is_semidefinite
 
 _ROUNDING = 1e-6
 """Share of the information of two coefficients (1) by which rounding may move what they have in common."""
@@ -58,12 +59,9 @@ class KnownEntry(ResultModel):
 
 def _check_information(information: Floats) -> None:
     """Raise ValueError where data and priors together (k, k) are no information: the inverse is then no covariance."""
-    largest = np.diag(information)
-    if (largest < 0.0).any():
+    if (np.diag(information) < 0.0).any():
         raise ValueError("information below zero")
-    scale = np.divide(1.0, np.sqrt(largest), out=np.zeros(len(largest)), where=largest > 0.0)
-    shares = scale[:, None] * information * scale
-    if (np.abs(shares - shares.T) > _ROUNDING).any() or np.linalg.eigvalsh(shares).min(initial=0.0) < -_ROUNDING:
+    if not is_semidefinite(information, _ROUNDING):
         raise ValueError("the information is that of no data: not symmetric, or below zero along some direction")
 
 
