@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.gyro_rate_nonlinearity import SCALE_ASYMMETR
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.plan_search.next_turn import named_class
 from sdimu_calibration.core.recording import DataError
@@ -106,10 +107,10 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
     # The doubt about the model is no noise: what is too small to be found stays so, however long a test is.
     ratio = np.sqrt(np.diag(fit.with_doubt(None).covariance)[limited]) / limit
     count = at.own
-    white = ratios(at, goals, _without(at.covariance, slice(count, None)))
-    unseen = (
-        ratios(at, goals, _without(at.covariance, slice(count, count + sum(len(e.parameters) for e in along)))) / white
-    )
+    # Beyond the model all is known, or the class alone: the ratio of both is what asymmetries may hide.
+    of_class = sum(len(effect.parameters) for effect in along)
+    white = ratios(at, goals, _known(at.covariance, count, len(at.names)))
+    unseen = ratios(at, goals, _known(at.covariance, count, count + of_class)) / white
     names = tuple(name for name, has in zip(fit.names, limited, strict=True) if has)
     aim = None if alike else _aim(at, goals)
     return Knowledge(at, names, ratio * unseen, np.maximum(ratio / white, 1.0), aim, named, Verdict.CONSISTENT)
@@ -150,10 +151,9 @@ def _hiding(fit: Fit, alike: Sequence[Effect]) -> tuple[Effect, ...]:
     return (SCALE_ASYMMETRY.only(left),) if left else ()
 
 
-def _without(covariance: Floats, rows: slice) -> Floats:
-    """Covariance (p, p) where the coefficients in `rows` are known."""
-    inner = covariance[rows, rows]
-    return covariance - covariance[:, rows] @ np.linalg.solve(inner, covariance[rows]) if len(inner) else covariance
+def _known(covariance: Floats, begin: int, end: int) -> Floats:
+    """Covariance (p, p) where the coefficients from `begin` to `end` are known."""
+    return conditioned(covariance, np.arange(begin, end)) if end > begin else covariance
 
 
 def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:

@@ -117,9 +117,9 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, h
     model = replace(fit.model, effects=cast("tuple[str, ...]", (*fit.sensors.effects, *more, *hiding)))
     setup = set_up(fit.test.site or fit.setup.site, fit.test.imu, model, fit.setup.epoch_s)
     sensors, had = setup.sensors, dict(zip(fit.setup.sensors.names, fit.setup.sensors.prior, strict=True))
-    own = {p.name for effect in hiding for p in effect.parameters}
+    hidden = {p.name for effect in hiding for p in effect.parameters}
     prior = np.array(
-        [had.get(n, s if n in own else room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)]
+        [had.get(n, s if n in hidden else room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)]
     )
     setup = replace(setup, sensors=replace(sensors, prior=prior))
     prepared, reference = fit.test.data(setup), fit.start.coefficients_of(sensors.names)
