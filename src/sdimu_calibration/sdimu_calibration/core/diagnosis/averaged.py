@@ -33,11 +33,11 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     own = np.setdiff1d(np.arange(q + count), added)
     moved, doubt = np.zeros(q + count), np.zeros((q + count, q + count))
     moved[own] = all_.mean - one.mean
-    doubt[np.ix_(own, own)] = _positive(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))
+    doubt[np.ix_(own, own)] = none_below_zero(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))
     return done.fit.with_doubt(doubt, moved)
 
 
-def _positive(difference: Floats, sigma: Floats) -> Floats:
+def none_below_zero(difference: Floats, sigma: Floats) -> Floats:
     """Part of a difference of covariances (q, q) that is none below zero, in units of `sigma` (q,)."""
     unit = np.where(sigma > 0.0, sigma, 1.0)
     values, vectors = np.linalg.eigh(difference / np.outer(unit, unit))

@@ -217,7 +217,7 @@ def climb(
     as_given = in_found_noise(request, base, done.found.noise) if done.chosen else done.fit
     # A missing effect that is found may be so large that without it there is no fit at all.
     before = outcome(as_given, refuse=not done.chosen)
-    after = doubted(outcome(done.fit) if done.chosen else before, widened)
+    after = doubted(outcome(done.fit) if done.chosen else before, widened.values, widened.covariance)
     own = any(c.family == "own" for c in done.chosen)
     raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))

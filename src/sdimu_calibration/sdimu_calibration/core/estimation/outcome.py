@@ -100,18 +100,21 @@ def inseparable(names: Sequence[str], covariance: Floats) -> list[Note]:
     ]
 
 
-def doubted(result: Calibration, fit: Fit) -> Calibration:
-    """Put the covariance of a fit with doubt about its model in the place of the one if the model is right.
+def doubted(result: Calibration, values: Floats, covariance: Floats) -> Calibration:
+    """Put mean and covariance over all probable models in the place of those if the model is right.
 
     Parameters
     ----------
     result : Calibration
-        Of the same fit without doubt.
+        If the model is right.
+    values : ndarray, shape (p,)
+        SI.
+    covariance : ndarray, shape (p, p)
     """
     conditional = np.sqrt(np.diag(result.covariance))
     free = conditional > 0.0
     ratio = np.ones(len(conditional))
-    ratio[free] = np.sqrt(np.diag(fit.covariance))[free] / conditional[free]
+    ratio[free] = np.sqrt(np.diag(covariance))[free] / conditional[free]
     worst = int(np.argmax(ratio))
     note = (
         "sigmas hold for the models that the data leave open, too: that of "
@@ -119,11 +122,7 @@ def doubted(result: Calibration, fit: Fit) -> Calibration:
     )
     told = (note,) if ratio[worst] > _TOLD else ()
     return replace(
-        result,
-        values=fit.values,
-        covariance=fit.covariance,
-        conditional_sigma=conditional,
-        notes=(*result.notes, *told),
+        result, values=values, covariance=covariance, conditional_sigma=conditional, notes=(*result.notes, *told)
     )
 
 

@@ -76,6 +76,11 @@ class SetBoard(Board[SetEvidence]):
         Names that the fit has for the first candidates of the evidence, which an earlier search told, by their labels.
     evidence, allowed, finer, wander, earlier : object
         As of `Board`; the noises are those of the reports.
+
+    Attributes
+    ----------
+    known : tuple of str
+        Coefficients of the fit in the order of the first columns of the evidence: of its model, then what was told.
     """
 
     def __init__(
@@ -100,6 +105,7 @@ class SetBoard(Board[SetEvidence]):
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self._white = (0,) * len(self.rivals)
         self._told = len(evidence.weight) + np.arange(len(told))
+        self.known = self._names[: len(evidence.weight) + len(told)]
 
     @property
     def has_noises(self) -> bool:

@@ -30,9 +30,9 @@ from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words, listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out, held_out_chance, own_values
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
-from sdimu_calibration.core.joint.set_result import SCATTERS, base_fit, set_outcome
+from sdimu_calibration.core.joint.set_result import SCATTERS, averaged_outcome, base_fit, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
@@ -159,7 +159,7 @@ def diagnose_set(
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
-    after = before if found.after is found.before else set_outcome(found.after)
+    after = averaged_outcome(found.after, found.posterior)
     findings = _findings(found)
     again = recurrence(leftovers(found.after, run))
     word = _verdict(findings, after, found.after, again)
@@ -279,9 +279,7 @@ def _differences(fit: SetFit) -> tuple[Floats, Floats]:
     -------
     values, sigma : ndarray, shape (P,)
     """
-    T = np.eye(len(fit.names))
-    for own, shared in own_values(fit.names):
-        T[own, shared] = -1.0
+    T = differences(fit.names)
     return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
 
 

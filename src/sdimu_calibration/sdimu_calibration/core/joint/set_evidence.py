@@ -95,6 +95,24 @@ def own_values(names: Sequence[str]) -> list[tuple[int, int]]:
     return [(k, place[name]) for k, name, recording in parts if recording and name in place]
 
 
+def differences(names: Sequence[str]) -> Floats:
+    """Take coefficients to those in which the value of one recording is its difference from that of all others.
+
+    Parameters
+    ----------
+    names : sequence of str, length P
+        Coefficients of a set.
+
+    Returns
+    -------
+    ndarray, shape (P, P)
+    """
+    D = np.eye(len(names))
+    for own, shared in own_values(names):
+        D[own, shared] = -1.0
+    return D
+
+
 def _folds(fit: SetFit) -> list[list[list[int]]]:
     """Folds of power-ons of recordings: by power-on where several were made, else each recording a fold."""
     if len(fit.power_ons) == 1:

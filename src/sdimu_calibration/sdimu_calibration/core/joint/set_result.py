@@ -11,15 +11,17 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.references import SITE_REFERENCES, told_of
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
-from sdimu_calibration.core.estimation.outcome import inseparable
+from sdimu_calibration.core.estimation.outcome import doubted, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.joint.member import Report, fitted
-from sdimu_calibration.core.joint.set_evidence import held_out
+from sdimu_calibration.core.joint.set_averages import over_all_models
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
     Calibration,
@@ -40,13 +42,29 @@ SCATTERS = 1e-3
 so by chance."""
 
 
+def averaged_outcome(fit: SetFit, window: Posterior[SetEvidence]) -> Calibration:
+    """Put the result of a joint fit together; coefficients and covariance are those over all probable models.
+
+    Parameters
+    ----------
+    window : Posterior
+        Of the models that the recordings leave probable, linear about the fit.
+    """
+    base = base_fit(fit)
+    mean = over_all_models(fit, window, base)
+    return doubted(_outcome(fit, base), *_reported(mean, base, mean.estimate.covariance))
+
+
 def set_outcome(fit: SetFit) -> Calibration:
     """Put the result of a joint fit together.
 
     Coefficients are those of the unit, a bias its mean over all power-ons that might be. What differs from power-on to
     power-on and from recording to recording stands in `of_set`.
     """
-    base = base_fit(fit)
+    return _outcome(fit, base_fit(fit))
+
+
+def _outcome(fit: SetFit, base: Fit) -> Calibration:
     values, covariance = _reported(fit, base, fit.estimate.covariance)
     places = [k for k, name in enumerate(fit.names) if name in SITE_REFERENCES]
     varied = variation(fit)
