@@ -4,6 +4,9 @@
 
 Each coefficient means the same in all models: a bias is that in the mean over the dwells, with whatever drifts or
 wanders there. Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
+
+An equation that no physics names shows what residuals look like, and not what its cause adds to the coefficients: with
+one probability it moves them as the equation does, with the other not at all.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.posterior.board import Board
@@ -25,6 +29,10 @@ from sdimu_calibration.core.posterior.posterior import Posterior
 
 _MOST = 400
 """Number of models that are averaged at most, the likeliest first: those behind weigh less than a thousandth each."""
+
+_IS_THE_CAUSE = 0.5
+"""Probability (1) that an equation that no physics names moves the coefficients as its cause does: nothing in the data
+says so, nothing speaks against it."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +82,14 @@ class Averages:
         self._means: dict[int, Floats] = {}
         self._noises: dict[NoiseModel, _Mean] = {}
 
-    def of_model(self, members: Members, noise: NoiseModel) -> Moments:
-        """Moments in one model."""
+    def of_model(self, members: Members, noise: NoiseModel, as_told: bool = True) -> Moments:
+        """Moments in one model.
+
+        Parameters
+        ----------
+        as_told : bool
+            Equations that no physics names are the cause; else they may stand for another one.
+        """
         evidence, data, one = self.board.evidence, self.board.in_noise(noise), self._mean(noise)
         p, q = len(evidence.weight), evidence.coefficients
         _, weight = self.board.parameters(members)
@@ -92,14 +106,21 @@ class Averages:
                 own[row, column] = one.covariance[channel, other]
         for place, (number, _) in enumerate(members, start=p):
             T[:, place] += self._shift(number)
-        return Moments(T @ estimate + constant, T @ covariance @ T.T + own)
+        mean = T @ estimate + constant
+        for place, (number, _) in enumerate(members, start=p):
+            if not as_told and self._candidate(number).family == "own":
+                # What the coefficients are off by where the size of the equation is zero, all else as it is.
+                moved = T @ covariance[:, place] * estimate[place] / covariance[place, place]
+                mean = mean - (1.0 - _IS_THE_CAUSE) * moved
+                own = own + _IS_THE_CAUSE * (1.0 - _IS_THE_CAUSE) * np.outer(moved, moved)
+        return Moments(mean, T @ covariance @ T.T + own)
 
     def of(self, found: Posterior[E]) -> Moments:
         """Moments over all models."""
         models = found.models[:_MOST]
         weight = np.array([m.probability for m in models])
         weight = weight / weight.sum()
-        each = [self.of_model(m.members, m.noise) for m in models]
+        each = [self.of_model(m.members, m.noise, as_told=False) for m in models]
         means = np.array([one.mean for one in each])
         mean = weight @ means
         apart = means - mean
@@ -110,9 +131,12 @@ class Averages:
         """Mean over the dwells that a candidate adds to each of q coefficients, per unit; shape (q,)."""
         if number not in self._means:
             evidence = self.board.evidence
-            effect = evidence.candidates[int(self.board.use[number]) - len(evidence.weight)].effect
-            self._means[number] = drift_mean(effect, self._dwell_means, evidence.names[: evidence.coefficients])
+            names = evidence.names[: evidence.coefficients]
+            self._means[number] = drift_mean(self._candidate(number).effect, self._dwell_means, names)
         return self._means[number]
+
+    def _candidate(self, number: int) -> Candidate:
+        return self.board.evidence.candidate(int(self.board.use[number]))
 
     def _mean(self, noise: NoiseModel) -> _Mean:
         if noise not in self._noises:
