@@ -27,3 +27,24 @@ def test_moments_over_all_models_are_those_of_the_mixture(bench):
     # Which drift it is stays open, so that models differ.
     assert (np.diag(told.covariance) / np.where(within > 0.0, within, 1.0)).max() > 1.1
     assert weight.max() < 0.95
+
+
+def test_half_of_an_equation_that_no_physics_names_moves_no_coefficient(bench):
+    diagnosis = bench.diagnosis(effects=("accel_z=15*ug*sin(2*pi*t/500 + 0.7)",))
+    assert diagnosis.own
+    found = diagnosis.found.posterior
+    averages = Averages(found.board, diagnosis.fit.dwell_means)
+    model = next(m for m in found.models if m.members)
+    assert {found.candidate(number).family for number, _ in model.members} == {"own"}
+    (member,) = model.members
+    told, without = (averages.of_model(members, model.noise) for members in ((member,), ()))
+    half = averages.of_model((member,), model.noise, as_told=False)
+    scale = np.sqrt(np.diag(told.covariance))
+    free = scale > 0.0
+    scale[~free] = 1.0
+    # Without the equation in the model its size is zero, and all else the same.
+    np.testing.assert_allclose((half.mean - 0.5 * (told.mean + without.mean)) / scale, 0.0, atol=1e-6)
+    moved = (told.mean - without.mean) / scale
+    added = (half.covariance - told.covariance) / np.outer(scale, scale)
+    np.testing.assert_allclose(added, 0.25 * np.outer(moved, moved), atol=1e-6)
+    assert np.abs(moved[free]).max() > 0.01

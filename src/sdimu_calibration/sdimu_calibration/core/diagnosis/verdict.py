@@ -20,6 +20,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.posterior import PROBABLE
+from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
@@ -89,7 +90,7 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
     if d.verdict == Verdict.CONSISTENT:
         return _consistent(d)
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
-        nothing = f" (nothing is missing: {in_percent(d.probabilities.nothing)})" if d.probabilities else ""
+        nothing = nothing_missing(d.probabilities)
         return f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}."
     if d.verdict == Verdict.DATA_FAULT:
         faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
@@ -103,19 +104,25 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
     return f"No effect of the catalogue fits, an equation does. {in_grades(every, _EQUATION)}"
 
 
+def nothing_missing(told: Probabilities | None) -> str:
+    """Say how probable it is that nothing is missing, behind a statement; empty where no probabilities are known."""
+    return f" (nothing is missing: {in_percent(told.nothing)})" if told else ""
+
+
+def something_missing(told: Probabilities) -> str:
+    """Say that something is missing where no effect by itself is probable: the likeliest, each with its probability."""
+    likely = ", ".join(f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:LISTED] if f.members)
+    return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
+
+
 def _consistent(d: Diagnosis) -> str:
     if d.rungs and d.rungs[0].scatter is not None:
         left = beyond(d.rungs[0].scatter)
         return f"No effect of the catalogue stands out of the scatter of this run. Scatter beyond white noise: {left}."
     odd = "; ".join(f.text for f in d.findings)
-    told = d.probabilities
-    if told is not None and told.nothing < PROBABLE:
-        likely = ", ".join(
-            f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:LISTED] if f.members
-        )
-        return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
-    nothing = "" if told is None else f" (nothing is missing: {in_percent(told.nothing)})"
-    clean = f"The model explains the recording: nothing stands out of the noise{nothing}"
+    if d.probabilities is not None and d.probabilities.nothing < PROBABLE:
+        return something_missing(d.probabilities)
+    clean = f"The model explains the recording: nothing stands out of the noise{nothing_missing(d.probabilities)}"
     if d.found.noise:
         clean = (
             f"{clean}; noise has the memory that the IMU's file states: {', '.join(map(term_in_words, d.found.noise))}"

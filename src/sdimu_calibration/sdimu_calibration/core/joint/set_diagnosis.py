@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.grades import (
     without_variant,
 )
 from sdimu_calibration.core.diagnosis.search import Search
+from sdimu_calibration.core.diagnosis.verdict import nothing_missing, something_missing
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
@@ -37,6 +38,7 @@ from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_o
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
+from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, Share, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
@@ -184,7 +186,8 @@ def diagnose_set(
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
     beside_function = found.after.function is not None
-    sentence = f"{_sentence(word, findings, after, again, beside_function)} {why}".strip()
+    told = None if beside_function else probabilities(found.posterior)
+    sentence = f"{_sentence(word, findings, after, again, beside_function, told)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -198,7 +201,7 @@ def diagnose_set(
         again,
         refused,
         without,
-        None if beside_function else probabilities(found.posterior),
+        told,
         beside.unknown if beside_function else (),
     )
 
@@ -309,7 +312,12 @@ def _scatter(result: Calibration) -> float:
 
 
 def _sentence(
-    word: Verdict, findings: Sequence[SetFinding], after: Calibration, again: Recurrence | None, function: bool
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    after: Calibration,
+    again: Recurrence | None,
+    function: bool,
+    told: Probabilities | None,
 ) -> str:
     """Say what was found, then what comes back of that what the model leaves.
 
@@ -317,18 +325,25 @@ def _sentence(
     """
     tells = again is not None and (not function or len(again.answer) > 0)
     more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
-    return f"{_found(word, findings, after, again, function)} {more}".strip()
+    return f"{_found(word, findings, after, again, function, told)} {more}".strip()
 
 
 def _found(
-    word: Verdict, findings: Sequence[SetFinding], after: Calibration, again: Recurrence | None, function: bool
+    word: Verdict,
+    findings: Sequence[SetFinding],
+    after: Calibration,
+    again: Recurrence | None,
+    function: bool,
+    told: Probabilities | None,
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
+    if word == Verdict.CONSISTENT and told is not None and told.nothing < PROBABLE:
+        return something_missing(told)
     if word == Verdict.CONSISTENT and again is not None:
-        return "The model explains all recordings together, each in a noise of its own."
+        return f"The model explains all recordings together, each in a noise of its own{nothing_missing(told)}."
     if word == Verdict.CONSISTENT:
-        return "The model explains all recordings together: nothing stands out of the noise."
+        return f"The model explains all recordings together: nothing stands out of the noise{nothing_missing(told)}."
     if word == Verdict.DATA_FAULT:
         return f"All recordings agree but for {names}."
     if word == Verdict.UNEXPLAINED:
