@@ -102,7 +102,7 @@ def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
     d = summary.diagnosis
     if d.verdict == Verdict.DATA_FAULT:
         return BAD, "The data have a fault"
-    if summary.candidates:
+    if summary.candidates or d.verdict == Verdict.CLASS_OF_EFFECTS:
         return DOUBTFUL, "Something is missing in the model"
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
         return DOUBTFUL, "The noise is not as stated"

@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from sdimu_calibration.core.advice import Kind
+from sdimu_calibration.core.diagnosis.advice import advice
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
+from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.effects.selection import resolve
@@ -81,6 +85,36 @@ def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike,
     of_set = SetFinding(candidate.label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
     assert verdict_of_set([of_set], after, SimpleNamespace(), None) == word
+
+
+@pytest.mark.parametrize(
+    ("nothing", "noise", "word"),
+    [
+        (0.6, (), Verdict.CONSISTENT),
+        (0.4, (), Verdict.CLASS_OF_EFFECTS),
+        (0.6, ("a walk",), Verdict.NOISE_MODEL_WRONG),
+        (0.4, ("a walk",), Verdict.CLASS_OF_EFFECTS),
+    ],
+)
+def test_a_recording_is_consistent_where_nothing_is_more_likely_missing_than_something(nothing, noise, word):
+    found = SimpleNamespace(posterior=SimpleNamespace(nothing=nothing))
+    assert verdict(Facts(found, (), (), (), noise, own=False, unexplained=False)) == word
+
+
+def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):
+    ranked = (("accel_cubic", 0.3), ("accel_quadratic", 0.2))
+    families = tuple(
+        FamilyShare(name, "accel", share, (MemberShare(f"{name}_z", share, 1.0, 0.1, "1/g", "ppm/g"),))
+        for name, share in ranked
+    )
+    nothing_chosen = replace(summary.diagnosis.found, chosen=np.empty(0, dtype=np.int64))
+    d = replace(summary.diagnosis, verdict=Verdict.CLASS_OF_EFFECTS, found=nothing_chosen)
+    vars(d)["probabilities"] = Probabilities(0.4, families, ())
+    assert sentence(d, ()) == (
+        "Something is missing (60 %), but no effect is probable: accel_cubic_z 30 %, accel_quadratic_z 20 %."
+    )
+    (turns,) = [one for one in advice(d, (), (), plan_seen(d.navigation)) if one.kind == Kind.RANK_TURNS]
+    assert turns.about == ("accel_cubic_z", "accel_quadratic_z")
 
 
 def test_a_coefficient_of_one_recording_is_named_with_it():

@@ -98,6 +98,10 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
     if d.verdict == Verdict.UNEXPLAINED:
         return _about_unknown(d, found)
     out = add([one for one in found if _belongs(one)], d.probabilities)
+    if not found and d.verdict == Verdict.CLASS_OF_EFFECTS and d.probabilities is not None:
+        likely = [family.members[0].label for family in d.probabilities.families if family.members]
+        names = tuple(name for name in likely if _in_catalogue(name))[:2]
+        return [Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)] if len(names) > 1 else []
     for one in found:
         if one.candidate.family == references.LATITUDE.name:
             out.append(Advice(Kind.CORRECT_LATITUDE, (one.value, one.sigma)))

@@ -73,6 +73,10 @@ def verdict(facts: Facts) -> Verdict:
             return Verdict.DATA_FAULT
         open_which = other_coefficients(chosen[0].label, facts.alike)
         return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
+    window = facts.found.posterior
+    if window is not None and window.nothing < PROBABLE:
+        # Something is missing, and no class by itself is likely: together they are.
+        return Verdict.CLASS_OF_EFFECTS
     if facts.noise:
         return Verdict.NOISE_MODEL_WRONG
     return Verdict.CONSISTENT
@@ -97,6 +101,8 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
         return f"The data have a fault: {'; '.join(faults)}."
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
+    if not d.chosen and d.probabilities is not None:
+        return something_missing(d.probabilities)
     every = graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities)
     if not d.own:
         return in_grades(every)
@@ -120,8 +126,6 @@ def _consistent(d: Diagnosis) -> str:
         left = beyond(d.rungs[0].scatter)
         return f"No effect of the catalogue stands out of the scatter of this run. Scatter beyond white noise: {left}."
     odd = "; ".join(f.text for f in d.findings)
-    if d.probabilities is not None and d.probabilities.nothing < PROBABLE:
-        return something_missing(d.probabilities)
     clean = f"The model explains the recording: nothing stands out of the noise{nothing_missing(d.probabilities)}"
     if d.found.noise:
         clean = (

@@ -38,7 +38,7 @@ from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_o
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plan_search import NextTurn
-from sdimu_calibration.core.posterior.posterior import PROBABLE
+from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Probabilities, Share, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
@@ -164,7 +164,7 @@ def diagnose_set(
     after = averaged_outcome(found.after, found.posterior)
     findings = _findings(found)
     again = recurrence(leftovers(found.after, run))
-    word = _verdict(findings, after, found.after, again)
+    word = _verdict(findings, after, found.after, again, found.posterior)
     refused: tuple[SetFinding, ...] = ()
     why = ""
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
@@ -286,7 +286,13 @@ def _differences(fit: SetFit) -> tuple[Floats, Floats]:
     return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
 
 
-def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, again: Recurrence | None) -> Verdict:
+def _verdict(
+    findings: Sequence[SetFinding],
+    after: Calibration,
+    fit: SetFit,
+    again: Recurrence | None,
+    window: Posterior[SetEvidence] | None = None,
+) -> Verdict:
     shared = [f for f in findings if not f.recording]
     error = after.fit["held_out_rms"]
     still = error is not None and error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
@@ -300,7 +306,10 @@ def _verdict(findings: Sequence[SetFinding], after: Calibration, fit: SetFit, ag
     if shared:
         open_which = other_coefficients(shared[0].label, shared[0].alike)
         return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
-    return Verdict.DATA_FAULT if findings else Verdict.CONSISTENT
+    if findings:
+        return Verdict.DATA_FAULT
+    likely = window is not None and window.nothing < PROBABLE
+    return Verdict.CLASS_OF_EFFECTS if likely else Verdict.CONSISTENT
 
 
 def _scatter(result: Calibration) -> float:
@@ -338,7 +347,7 @@ def _found(
 ) -> str:
     listed = [_named(f) for f in findings]
     names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
-    if word == Verdict.CONSISTENT and told is not None and told.nothing < PROBABLE:
+    if word == Verdict.CLASS_OF_EFFECTS and not findings and told is not None:
         return something_missing(told)
     if word == Verdict.CONSISTENT and again is not None:
         return f"The model explains all recordings together, each in a noise of its own{nothing_missing(told)}."
