@@ -33,7 +33,7 @@ from sdimu_calibration.core.joint.recurrence_words import answer_in_words, liste
 from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out, held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
-from sdimu_calibration.core.joint.set_result import SCATTERS, averaged_outcome, base_fit, set_outcome
+from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
@@ -161,7 +161,8 @@ def diagnose_set(
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
-    after = averaged_outcome(found.after, found.posterior)
+    told = before if found.after is found.before else set_outcome(found.after)
+    after = averaged(told, found.after, found.posterior)
     findings = _findings(found)
     again = recurrence(leftovers(found.after, run))
     word = _verdict(findings, after, found.after, again, found.posterior)
@@ -182,12 +183,12 @@ def diagnose_set(
         refused += tuple(f for f in findings if f.tag in needed_not)
         why = f"{_explained(again, needed_not)} {why}".strip()
         after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
-    test = base_fit(found.after).test
+    test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     without = _error_without(found)
     beside_function = found.after.function is not None
-    told = None if beside_function else probabilities(found.posterior)
-    sentence = f"{_sentence(word, findings, after, again, beside_function, told)} {why}".strip()
+    shares = None if beside_function else probabilities(found.posterior)
+    sentence = f"{_sentence(word, findings, after, again, beside_function, shares)} {why}".strip()
     return SetDiagnosis(
         word,
         sentence,
@@ -201,7 +202,7 @@ def diagnose_set(
         again,
         refused,
         without,
-        told,
+        shares,
         beside.unknown if beside_function else (),
     )
 

@@ -11,13 +11,14 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
 from sdimu_calibration.core.filter.passes import MOST_WIDENINGS
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
-from sdimu_calibration.core.joint.member import Job, Member, Report
+from sdimu_calibration.core.joint.member import Job, Member, Report, fitted
 from sdimu_calibration.core.joint.same_unit import check_one_unit
 from sdimu_calibration.core.joint.scope import by_name, split_tag
 from sdimu_calibration.core.joint.set_order import (
@@ -122,6 +123,14 @@ class SetFit:
     def varying_names(self) -> tuple[str, ...]:
         """Coefficients that vary, in the order of the columns of `estimate.deviation`."""
         return tuple(n for effect in self.varying.values() for n in effect) if self.turn_on else ()
+
+    @cached_property
+    def base(self) -> Fit:
+        """Fit of one recording about the joint estimate: it gives the names and the frame of the report."""
+        by_name = {m.name: m for m in self.members}
+        # The last of those with most stops: the frame needs a recording that shows much, and one is as good as another.
+        report = max(reversed(self.reports), key=lambda r: len(r.times.stops))
+        return fitted(job_of(by_name[report.name], SetOptions(self.model), self))
 
     def values_of(self, report: Report) -> dict[str, float]:
         """Coefficients (SI) of the estimator in one recording, deviations of its power-on included, by name."""

@@ -14,10 +14,10 @@ from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationF
 from sdimu_calibration.core.estimation.outcome import doubted, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
-from sdimu_calibration.core.joint.member import Report, fitted
+from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
-from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, job_of, power_on
+from sdimu_calibration.core.joint.set_fit import SetFit, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
@@ -42,17 +42,18 @@ SCATTERS = 1e-3
 so by chance."""
 
 
-def averaged_outcome(fit: SetFit, window: Posterior[SetEvidence]) -> Calibration:
-    """Put the result of a joint fit together; coefficients and covariance are those over all probable models.
+def averaged(result: Calibration, fit: SetFit, window: Posterior[SetEvidence]) -> Calibration:
+    """Put coefficients and covariance over all probable models in the place of those of a joint fit.
 
     Parameters
     ----------
+    result : Calibration
+        Of `fit`.
     window : Posterior
         Of the models that the recordings leave probable, linear about the fit.
     """
-    base = base_fit(fit)
-    mean = over_all_models(fit, window, base)
-    return doubted(_outcome(fit, base), *_reported(mean, base, mean.estimate.covariance))
+    mean = over_all_models(fit, window, fit.base)
+    return doubted(result, *_reported(mean, fit.base, mean.estimate.covariance))
 
 
 def set_outcome(fit: SetFit) -> Calibration:
@@ -61,10 +62,7 @@ def set_outcome(fit: SetFit) -> Calibration:
     Coefficients are those of the unit, a bias its mean over all power-ons that might be. What differs from power-on to
     power-on and from recording to recording stands in `of_set`.
     """
-    return _outcome(fit, base_fit(fit))
-
-
-def _outcome(fit: SetFit, base: Fit) -> Calibration:
+    base = fit.base
     values, covariance = _reported(fit, base, fit.estimate.covariance)
     places = [k for k, name in enumerate(fit.names) if name in SITE_REFERENCES]
     varied = variation(fit)
@@ -111,15 +109,6 @@ def _outcome(fit: SetFit, base: Fit) -> Calibration:
         imu_noise=base.test.imu.noise_alone,
         references=references,
     )
-
-
-def base_fit(fit: SetFit) -> Fit:
-    """Fit of one recording about the joint estimate: it gives the names and the frame of the report."""
-    by_name = {m.name: m for m in fit.members}
-    # The last of those with most stops: the frame needs a recording that shows much, and one is as good as the other.
-    report = max(reversed(fit.reports), key=lambda r: len(r.times.stops))
-    job = job_of(by_name[report.name], SetOptions(fit.model), fit)
-    return fitted(job)
 
 
 def _reported(fit: SetFit, base: Fit, covariance: Floats) -> tuple[Floats, Floats]:
