@@ -13,8 +13,9 @@ from sdimu_calibration.api.diagnosed import Diagnosed
 from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.member import Member
-from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, SetFinding, diagnose_set
+from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
+from sdimu_calibration.core.joint.set_verdict import SetFinding
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError

@@ -17,8 +17,8 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.joint.set_diagnosis import SetFinding
-from sdimu_calibration.core.joint.set_diagnosis import _verdict as verdict_of_set
+from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding
+from sdimu_calibration.core.joint.set_verdict import verdict as verdict_of_set
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
@@ -84,7 +84,7 @@ def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike,
     assert verdict(Facts(found, (candidate,), alike, (), (), own=False, unexplained=False)) == word
     of_set = SetFinding(candidate.label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
-    assert verdict_of_set([of_set], after, SimpleNamespace(), None) == word
+    assert verdict_of_set(SetFacts([of_set], after, SimpleNamespace(function=None), None, None)) == word
 
 
 @pytest.mark.parametrize(

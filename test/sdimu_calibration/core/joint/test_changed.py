@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.advice import Kind
-from sdimu_calibration.core.joint.set_diagnosis import SetFinding, diagnose_set, sites_to_check
+from sdimu_calibration.core.joint.set_diagnosis import diagnose_set, sites_to_check
 from sdimu_calibration.core.joint.set_evidence import set_evidence
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.joint.set_verdict import SetFinding
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
 

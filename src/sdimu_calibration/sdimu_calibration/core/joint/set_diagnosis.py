@@ -1,4 +1,4 @@
-"""The verdict on a set: a word that programs read, a sentence for people, and every effect that was found."""
+"""What the model of a set misses: search, what is taken back, what comes back, verdict and advice, in this order."""
 
 from __future__ import annotations
 
@@ -9,17 +9,8 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import (
-    NAMED,
-    Graded,
-    in_grades,
-    named,
-    other_coefficients,
-    size,
-    without_variant,
-)
+from sdimu_calibration.core.diagnosis.grades import size
 from sdimu_calibration.core.diagnosis.search import Search
-from sdimu_calibration.core.diagnosis.verdict import nothing_missing, something_missing
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
@@ -29,17 +20,16 @@ from sdimu_calibration.core.joint.function_fit import Beside, needless, with_fun
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
-from sdimu_calibration.core.joint.recurrence_words import answer_in_words, listed, next_steps
+from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out, held_out_chance
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
-from sdimu_calibration.core.note import Topic, topic_of, without_advice
+from sdimu_calibration.core.joint.set_verdict import LISTED, SetFacts, SetFinding, sentence, verdict
 from sdimu_calibration.core.plan_search import NextTurn
-from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
-from sdimu_calibration.core.posterior.told import Probabilities, Share, probabilities
+from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
 from sdimu_calibration.core.progress import Progress, silent
@@ -48,58 +38,11 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Work
 
-_STILL_WRONG = 1.25
-"""Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
-reach it: 1 is right."""
 _SHARED = 10.0
 """Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
 its size cost less."""
 _TELLS = 3.0
 """Significance (sigma) from which effects are told apart: a turn that reaches less is no advice."""
-_LISTED = 4
-"""Number of effects that a sentence names: the table has the rest."""
-
-
-@dataclass(frozen=True)
-class SetFinding:
-    """An effect that was found.
-
-    Attributes
-    ----------
-    recording : str
-        The only one that shows it; empty where all do.
-    value, sigma : float
-        SI, of the joint fit with everything that was found.
-    z : float
-        Score beside what was found before it.
-    alike : tuple of str
-        What the set cannot tell from it.
-    probability : float
-        That it or one of these is in all recordings, or in this one.
-    may_be : tuple of Share
-        Coefficients of that class with the probability of each, the likeliest first.
-    against : str
-        The other one of two recordings, where a coefficient is not the same in both: no data tell which of them
-        changed. Empty for all else.
-    """
-
-    label: str
-    title: str
-    recording: str
-    value: float
-    sigma: float
-    z: float
-    unit: str
-    display_unit: str
-    alike: tuple[str, ...]
-    probability: float = float("nan")
-    may_be: tuple[Share, ...] = ()
-    against: str = ""
-
-    @property
-    def tag(self) -> str:
-        """Label, of one recording with its name behind."""
-        return tagged(self.label, self.recording) if self.recording else self.label
 
 
 @dataclass(frozen=True)
@@ -163,47 +106,45 @@ def diagnose_set(
     before = set_outcome(found.before)
     told = before if found.after is found.before else set_outcome(found.after)
     after = averaged(told, found.after, found.posterior)
-    findings = _findings(found)
     again = recurrence(leftovers(found.after, run))
-    word = _verdict(findings, after, found.after, again, found.posterior)
+    facts = SetFacts(_findings(found), after, found.after, again, probabilities(found.posterior))
+    word = verdict(facts)
     refused: tuple[SetFinding, ...] = ()
     why = ""
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
-        refused = tuple(f for f in findings if not f.recording)
+        refused = tuple(f for f in facts.findings if not f.recording)
         why = _fits_worse(refused, before, after)
         found = taken_back(found, options, run, [f.label for f in refused])
-        after, findings = (set_outcome(found.after), _findings(found)) if found.local else (before, ())
+        after = set_outcome(found.after) if found.local else before
         again = recurrence(leftovers(found.after, run))
-        word = _verdict(findings, after, found.after, again)
+        facts = SetFacts(_findings(found), after, found.after, again, None)
     asked = again is not None and (not again.answer or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)
-        refused += tuple(f for f in findings if f.tag in needed_not)
+        refused += tuple(f for f in facts.findings if f.tag in needed_not)
         why = f"{_explained(again, needed_not)} {why}".strip()
-        after, findings, word = set_outcome(found.after), _findings(found), Verdict.UNEXPLAINED
+        facts = SetFacts(_findings(found), set_outcome(found.after), found.after, again, None)
+        word = verdict(facts)
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
-    without = _error_without(found)
-    beside_function = found.after.function is not None
-    shares = None if beside_function else probabilities(found.posterior)
-    sentence = f"{_sentence(word, findings, after, again, beside_function, shares)} {why}".strip()
+    steps = next_steps(again, facts.beside_function)
     return SetDiagnosis(
         word,
-        sentence,
-        findings,
+        f"{sentence(word, facts)} {why}".strip(),
+        tuple(facts.findings),
         before,
-        after,
+        facts.after,
         found.threshold,
-        _advice(word, findings, next_recording(found.after, standing, test), next_steps(again, beside_function)),
+        _advice(word, facts.findings, next_recording(found.after, standing, test), steps),
         standing,
         found.first,
         again,
         refused,
-        without,
-        shares,
-        beside.unknown if beside_function else (),
+        _error_without(found),
+        facts.told,
+        beside.unknown if facts.beside_function else (),
     )
 
 
@@ -287,103 +228,8 @@ def _differences(fit: SetFit) -> tuple[Floats, Floats]:
     return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
 
 
-def _verdict(
-    findings: Sequence[SetFinding],
-    after: Calibration,
-    fit: SetFit,
-    again: Recurrence | None,
-    window: Posterior[SetEvidence] | None = None,
-) -> Verdict:
-    shared = [f for f in findings if not f.recording]
-    error = after.fit["held_out_rms"]
-    still = error is not None and error > _STILL_WRONG and held_out_chance(fit, error) < SCATTERS
-    # Noise does not come back: where something does, it is no noise, whatever each recording took it for.
-    left = _scatter(after) < SCATTERS or still or (again is not None and len(again.answer) > 0)
-    # A fault leaves traces in its recording that are no physics of the unit.
-    if left and (shared or not findings):
-        return Verdict.UNEXPLAINED
-    if len(shared) > 1:
-        return Verdict.SEVERAL_EFFECTS
-    if shared:
-        open_which = other_coefficients(shared[0].label, shared[0].alike)
-        return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
-    if findings:
-        return Verdict.DATA_FAULT
-    likely = window is not None and window.nothing < PROBABLE
-    return Verdict.CLASS_OF_EFFECTS if likely else Verdict.CONSISTENT
-
-
-def _scatter(result: Calibration) -> float:
-    """Probability that the scatter of coefficients from recording to recording is chance, all counted."""
-    if result.of_set is None:
-        return 1.0
-    seen = result.of_set.scatter_p[np.isfinite(result.of_set.scatter_p)]
-    return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
-
-
-def _sentence(
-    word: Verdict,
-    findings: Sequence[SetFinding],
-    after: Calibration,
-    again: Recurrence | None,
-    function: bool,
-    told: Probabilities | None,
-) -> str:
-    """Say what was found, then what comes back of that what the model leaves.
-
-    Where a `function` of the attitude explains what is left, stops that do not come back are too few, and say nothing.
-    """
-    tells = again is not None and (not function or len(again.answer) > 0)
-    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
-    return f"{_found(word, findings, after, again, function, told)} {more}".strip()
-
-
-def _found(
-    word: Verdict,
-    findings: Sequence[SetFinding],
-    after: Calibration,
-    again: Recurrence | None,
-    function: bool,
-    told: Probabilities | None,
-) -> str:
-    listed = [_named(f) for f in findings]
-    names = " and ".join(listed[:_LISTED]) + (f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else "")
-    if word == Verdict.CLASS_OF_EFFECTS and not findings and told is not None:
-        return something_missing(told)
-    if word == Verdict.CONSISTENT and again is not None:
-        return f"The model explains all recordings together, each in a noise of its own{nothing_missing(told)}."
-    if word == Verdict.CONSISTENT:
-        return f"The model explains all recordings together: nothing stands out of the noise{nothing_missing(told)}."
-    if word == Verdict.DATA_FAULT:
-        return f"All recordings agree but for {names}."
-    if word == Verdict.UNEXPLAINED:
-        most = f" Found, but not all: {names}." if names else ""
-        shared = function or (again is not None and again.answer and not _odd(after))
-        what = "The recordings share something" if shared else "Something differs between the recordings"
-        return f"{what} that no effect of the catalogue explains.{most}{'' if function else _odd(after)}"
-    return in_grades(list(map(_graded, findings)))
-
-
-def _graded(f: SetFinding) -> Graded:
-    # Of what is of one recording alone the class is not told: what happened there is to be found out.
-    shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
-    return Graded(_named(f), without_variant(f.label), size(f.value, f.sigma, f.display_unit), f.probability, shares)
-
-
-def _named(f: SetFinding) -> str:
-    if f.against:
-        return (
-            f"{named(f.label)}, which differs by {size(f.value, f.sigma, f.display_unit)} from {f.against} to "
-            f"{f.recording} (two recordings do not tell which of them changed)"
-        )
-    if f.recording and is_change(f.label):
-        return f"{named(f.label)} changed by {size(f.value, f.sigma, f.display_unit)} in {f.recording}"
-    where = f" in {f.recording} alone" if f.recording else ""
-    return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
-
-
 def _fits_worse(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
-    names = ", ".join(f.label for f in findings[:_LISTED]) + (", ..." if len(findings) > _LISTED else "")
+    names = ", ".join(f.label for f in findings[:LISTED]) + (", ..." if len(findings) > LISTED else "")
     return (
         f"The model stays as given: with {names} the error at recordings held out, each model in the noise that it "
         f"leaves, rises from {_rms(before)} to {_rms(after)}."
@@ -394,11 +240,6 @@ def _rises(before: Calibration, after: Calibration) -> bool:
     """Whether recordings held out fit worse with what was found, by more than a sentence rounds away."""
     one, two = before.fit["held_out_rms"], after.fit["held_out_rms"]
     return one is not None and two is not None and round(two, 3) > round(one, 3)
-
-
-def _odd(result: Calibration) -> str:
-    lines = without_advice(line for line in result.warnings if topic_of(line) == Topic.DIFFERS)
-    return f" {lines[0]}." if lines else ""
 
 
 def _rms(result: Calibration) -> str:

@@ -1,0 +1,196 @@
+"""The verdict on a set of recordings: a word that programs read, and a sentence for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.grades import (
+    NAMED,
+    Graded,
+    in_grades,
+    named,
+    other_coefficients,
+    size,
+    without_variant,
+)
+from sdimu_calibration.core.diagnosis.verdict import nothing_missing, something_missing
+from sdimu_calibration.core.joint.changed import is_change
+from sdimu_calibration.core.joint.recurrence import Recurrence
+from sdimu_calibration.core.joint.recurrence_words import answer_in_words
+from sdimu_calibration.core.joint.scope import tagged
+from sdimu_calibration.core.joint.set_evidence import held_out_chance
+from sdimu_calibration.core.joint.set_fit import SetFit
+from sdimu_calibration.core.joint.set_result import SCATTERS
+from sdimu_calibration.core.note import Topic, topic_of, without_advice
+from sdimu_calibration.core.posterior.posterior import PROBABLE
+from sdimu_calibration.core.posterior.told import Probabilities, Share
+from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.verdict import Verdict
+
+_STILL_WRONG = 1.25
+"""Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
+reach it: 1 is right."""
+LISTED = 4
+"""Number of effects that a sentence names: the table has the rest."""
+
+
+@dataclass(frozen=True)
+class SetFinding:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    recording : str
+        The only one that shows it; empty where all do.
+    value, sigma : float
+        SI, of the joint fit with everything that was found.
+    z : float
+        Score beside what was found before it.
+    alike : tuple of str
+        What the set cannot tell from it.
+    probability : float
+        That it or one of these is in all recordings, or in this one.
+    may_be : tuple of Share
+        Coefficients of that class with the probability of each, the likeliest first.
+    against : str
+        The other one of two recordings, where a coefficient is not the same in both: no data tell which of them
+        changed. Empty for all else.
+    """
+
+    label: str
+    title: str
+    recording: str
+    value: float
+    sigma: float
+    z: float
+    unit: str
+    display_unit: str
+    alike: tuple[str, ...]
+    probability: float = float("nan")
+    may_be: tuple[Share, ...] = ()
+    against: str = ""
+
+    @property
+    def tag(self) -> str:
+        """Label, of one recording with its name behind."""
+        return tagged(self.label, self.recording) if self.recording else self.label
+
+
+@dataclass(frozen=True)
+class SetFacts:
+    """What the verdict on a set follows from.
+
+    Attributes
+    ----------
+    after : Calibration
+        With what was found.
+    fit : SetFit
+        The same, as it was estimated.
+    again : Recurrence or None
+        What comes back of that what the model leaves in the stops; None where it leaves nothing.
+    told : Probabilities or None
+        None where the search did not know of all that explains the set: a function of the attitude, or what was taken
+        back.
+    """
+
+    findings: Sequence[SetFinding]
+    after: Calibration
+    fit: SetFit
+    again: Recurrence | None
+    told: Probabilities | None
+
+    @property
+    def beside_function(self) -> bool:
+        """Whether an unknown function of the attitude explains what is left."""
+        return self.fit.function is not None
+
+    @property
+    def comes_back(self) -> bool:
+        """Whether what is left comes back: it is no noise then, whatever each recording took it for."""
+        return self.again is not None and len(self.again.answer) > 0
+
+
+def verdict(facts: SetFacts) -> Verdict:
+    """Give the verdict."""
+    findings, error = facts.findings, facts.after.fit["held_out_rms"]
+    shared = [f for f in findings if not f.recording]
+    if facts.beside_function:
+        return Verdict.UNEXPLAINED
+    still = error is not None and error > _STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
+    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back
+    # A fault leaves traces in its recording that are no physics of the unit.
+    if left and (shared or not findings):
+        return Verdict.UNEXPLAINED
+    if len(shared) > 1:
+        return Verdict.SEVERAL_EFFECTS
+    if shared:
+        open_which = other_coefficients(shared[0].label, shared[0].alike)
+        return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
+    if findings:
+        return Verdict.DATA_FAULT
+    likely = facts.told is not None and facts.told.nothing < PROBABLE
+    return Verdict.CLASS_OF_EFFECTS if likely else Verdict.CONSISTENT
+
+
+def _scatter(result: Calibration) -> float:
+    """Probability that the scatter of coefficients from recording to recording is chance, all counted."""
+    if result.of_set is None:
+        return 1.0
+    seen = result.of_set.scatter_p[np.isfinite(result.of_set.scatter_p)]
+    return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
+
+
+def sentence(word: Verdict, facts: SetFacts) -> str:
+    """Say what was found, then what comes back of that what the model leaves."""
+    again = facts.again
+    # Beside a function that explains what is left, stops that do not come back are too few, and say nothing.
+    tells = again is not None and (not facts.beside_function or facts.comes_back)
+    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
+    return f"{_found(word, facts)} {more}".strip()
+
+
+def _found(word: Verdict, facts: SetFacts) -> str:
+    findings, told = facts.findings, facts.told
+    if word == Verdict.CLASS_OF_EFFECTS and not findings and told is not None:
+        return something_missing(told)
+    if word == Verdict.CONSISTENT:
+        how = "nothing stands out of the noise" if facts.again is None else "each in a noise of its own"
+        mark = ":" if facts.again is None else ","
+        return f"The model explains all recordings together{mark} {how}{nothing_missing(told)}."
+    if word in {Verdict.DATA_FAULT, Verdict.UNEXPLAINED}:
+        names = " and ".join(map(_named, findings[:LISTED]))
+        names += f" and {len(findings) - LISTED} more" if len(findings) > LISTED else ""
+        if word == Verdict.DATA_FAULT:
+            return f"All recordings agree but for {names}."
+        most = f" Found, but not all: {names}." if names else ""
+        odd = "" if facts.beside_function else _odd(facts.after)
+        shared = facts.beside_function or (facts.comes_back and not odd)
+        what = "The recordings share something" if shared else "Something differs between the recordings"
+        return f"{what} that no effect of the catalogue explains.{most}{odd}"
+    return in_grades(list(map(_graded, findings)))
+
+
+def _graded(f: SetFinding) -> Graded:
+    # Of what is of one recording alone the class is not told: what happened there is to be found out.
+    shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
+    return Graded(_named(f), without_variant(f.label), size(f.value, f.sigma, f.display_unit), f.probability, shares)
+
+
+def _named(f: SetFinding) -> str:
+    if f.against:
+        return (
+            f"{named(f.label)}, which differs by {size(f.value, f.sigma, f.display_unit)} from {f.against} to "
+            f"{f.recording} (two recordings do not tell which of them changed)"
+        )
+    if f.recording and is_change(f.label):
+        return f"{named(f.label)} changed by {size(f.value, f.sigma, f.display_unit)} in {f.recording}"
+    where = f" in {f.recording} alone" if f.recording else ""
+    return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
+
+
+def _odd(result: Calibration) -> str:
+    lines = without_advice(line for line in result.warnings if topic_of(line) == Topic.DIFFERS)
+    return f" {lines[0]}." if lines else ""
