@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ import pytest
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
@@ -62,11 +66,36 @@ def of(found, name):
     return fit.estimate.values[place] / to_si(1.0, "deg/h/h"), sigma / to_si(1.0, "deg/h/h")
 
 
-def test_what_all_have_and_one_has_more_of_is_told_as_both(options):
-    """Found in one recording first, which alone takes it for a random walk."""
+@pytest.fixture(scope="module")
+def both(options):
+    """What is found where all recordings have a ramp, and one has more of it."""
     some = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=0.25 deg/h/h",))
     more = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=1.2 deg/h/h",))
-    found = search_set((*some.members[:2], more.members[2]), options, here)
+    return search_set((*some.members[:2], more.members[2]), options, here)
+
+
+def test_over_the_told_model_alone_coefficients_are_those_of_its_fit(both):
+    """The window takes what was told as candidates, drifts in the mean over the dwells, and comes back to the fit."""
+    fit, window = both.after, both.posterior
+    told = replace(window.models[0], members=window.told.members, noise=NoiseModel(), probability=1.0)
+    one = over_all_models(fit, SimpleNamespace(board=window.board, models=(told,)), fit.base)
+    sigma = np.sqrt(np.diag(fit.estimate.covariance))
+    np.testing.assert_allclose(one.estimate.values / sigma, fit.estimate.values / sigma, atol=0.05)
+    np.testing.assert_allclose(np.sqrt(np.diag(one.estimate.covariance)) / sigma, 1.0, atol=0.01)
+
+
+def test_over_all_models_the_bias_that_drifts_is_known_less_well(both):
+    """Which drift it is stays open."""
+    mean = over_all_models(both.after, both.posterior, both.after.base)
+    ratio = np.sqrt(np.diag(mean.estimate.covariance) / np.diag(both.after.estimate.covariance))
+    assert ratio.min() > 1.0 - 1e-9
+    print("RATIO", sorted(zip(ratio.round(4).tolist(), both.after.names), reverse=True)[:12])
+    assert ratio.max() > 1.05
+
+
+def test_what_all_have_and_one_has_more_of_is_told_as_both(both):
+    """Found in one recording first, which alone takes it for a random walk."""
+    found = both
     assert [c.label for c in found.chosen] == ["gyro_bias_ramp_x"]
     assert [one.label for one in found.local] == ["gyro_bias_ramp_x@r2"]
     for name, true in (("gyro_bias_ramp_x", 0.25), ("gyro_bias_ramp_x@r2", 1.2)):
