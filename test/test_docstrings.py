@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "sdimu_calibration" / "sdimu_calibration"
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|NDArray|Stamps)\b")
 FLOATING = re.compile(r"\b(Floats|NDArray\[np\.float64\])")
-SHAPE = re.compile(r"\bshapes? \(|\blength [a-zA-Z]\b")
+SHAPE = re.compile(r"(?i)\bshapes? \(|\blength [a-z]\b")
 PURE_NUMBER = re.compile(r"(?i)\b(share|ratio|factor|multiple|number|percentile|weight|probability|count)s?\b")
 BARE = re.compile(r"^\S[^\n]* : [^\n]*(\n(?!    )|\Z)", re.MULTILINE)
 UNIT = re.compile(r"\b(rad|m/s|deg|degC|Hz|SI|units?|dimensionless|whitened|normalised|customary)\b|\((s|m|g|1)\)")
@@ -59,10 +60,22 @@ def public(path: Path) -> Iterator[Documented]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             yield Documented(node.name, node, above)
             if isinstance(node, ast.ClassDef):
-                whole = f"{above}\n{ast.get_docstring(node) or ''}"
+                whole = "\n".join([above, ast.get_docstring(node) or "", *said_beside(node).values()])
                 for part in node.body:
                     if isinstance(part, ast.FunctionDef) and not part.name.startswith("_"):
                         yield Documented(f"{node.name}.{part.name}", part, whole, names_of_bases(node))
+
+
+def said_beside(node: ast.ClassDef) -> dict[str, str]:
+    """What is said of the fields of a class beside them: below one, or below several that it names first."""
+    said = {}
+    for field, after in pairwise(node.body):
+        if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            text = " ".join(str(after.value.value).split())
+            several = re.match(r"`\w+`(, `\w+`)+:", text)
+            for name in re.findall(r"\w+", several[0]) if several else [ast.unparse(field.target)]:
+                said[name] = text
+    return said
 
 
 def names_of_bases(node: ast.ClassDef) -> tuple[str, ...]:
@@ -92,11 +105,12 @@ def inherits(method: str, bases: tuple[str, ...]) -> bool:
 def faults(one: Documented) -> Iterator[str]:
     """What is missing in one docstring."""
     if isinstance(one.node, ast.ClassDef):
-        yield from faults_of_entries(one, "Attributes", array_fields(one.node))
+        entries_of_fields = entries_of(one, "Attributes") | said_beside(one.node)
+        yield from faults_of_entries(one, "Attributes", array_fields(one.node), entries_of_fields)
         return
     if inherits(one.node.name, one.bases):
         return
-    yield from faults_of_entries(one, "Parameters", array_arguments(one.node))
+    yield from faults_of_entries(one, "Parameters", array_arguments(one.node), entries_of(one, "Parameters"))
     given = ast.unparse(one.node.returns) if one.node.returns else ""
     if not ARRAY.search(given):
         return
@@ -112,11 +126,14 @@ def faults(one: Documented) -> Iterator[str]:
         yield "Returns: no unit"
 
 
-def faults_of_entries(one: Documented, section: str, arrays: dict[str, str]) -> Iterator[str]:
-    """What is missing for arrays (annotation by name) in the section that lists them."""
+def entries_of(one: Documented, section: str) -> dict[str, str]:
+    return {name.strip("* "): text(e) for e in one.sections[section] for name in e.name.split(",")}
+
+
+def faults_of_entries(one: Documented, section: str, arrays: dict[str, str], entries: dict[str, str]) -> Iterator[str]:
+    """What is missing for arrays (annotation by name) among what is said of each."""
     if not arrays:
         return
-    entries = {name.strip("* "): text(e) for e in one.sections[section] for name in e.name.split(",")}
     if not entries:
         yield f"no {section} section"
         return
@@ -125,7 +142,7 @@ def faults_of_entries(one: Documented, section: str, arrays: dict[str, str]) -> 
             yield f"{section}: '{name}' is not listed"
         elif not SHAPE.search(entries[name]):
             yield f"{section}: '{name}' has no shape"
-        elif FLOATING.search(annotation) and not UNIT.search(f"{entries[name]}\n{one.doc}\n{one.module_doc}"):
+        elif FLOATING.search(annotation) and not UNIT.search("\n".join([*entries.values(), one.doc, one.module_doc])):
             yield f"{section}: '{name}' has no unit, and neither the module nor the package declares one"
 
 
@@ -221,6 +238,18 @@ def test_a_method_inherits_the_sections_of_the_one_it_overrides(tmp_path):
         '    def own(self) -> Ints:\n        """Give another."""\n'
     )
     assert faults_of(tmp_path / "core.py") == ["Other.own: no Returns section"]
+
+
+def test_what_is_said_below_a_field_counts(tmp_path):
+    (tmp_path / "__init__.py").touch()
+    (tmp_path / "core.py").write_text(
+        'class Held:\n    """Held."""\n\n    a: Floats\n    b: Floats\n    """`a`, `b`: As read (rad), shape (n,)."""\n'
+        '    c: Floats\n    """As read (rad)."""\n    d: Floats\n'
+    )
+    assert faults_of(tmp_path / "core.py") == [
+        "Held: Attributes: 'c' has no shape",
+        "Held: Attributes: 'd' is not listed",
+    ]
 
 
 def test_what_is_missing_is_found(tmp_path):

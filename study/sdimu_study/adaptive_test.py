@@ -35,17 +35,10 @@ from sdimu_sim.core.truth import ImuTruth
 
 @dataclass(frozen=True)
 class Look:
-    """What a look at the data found.
-
-    Attributes
-    ----------
-    minutes : float
-        Length of the test then.
-    found : Diagnosis
-    known : Knowledge
-    """
+    """What a look at the data found."""
 
     minutes: float
+    """Length of the test then."""
     found: Diagnosis
     known: Knowledge
 
@@ -57,20 +50,12 @@ class Look:
 
 @dataclass(frozen=True)
 class AdaptiveTest:
-    """A finished test.
-
-    Attributes
-    ----------
-    plan : Plan
-        What was chosen, in the order in which it was done.
-    choices : tuple of (float, Choice)
-        Minutes at which each was made.
-    looks : tuple of Look
-    end : End
-    """
+    """A finished test."""
 
     plan: Plan
+    """What was chosen, in the order in which it was done."""
     choices: tuple[tuple[float, Choice], ...]
+    """Minutes at which each was made."""
     looks: tuple[Look, ...]
     end: End
 

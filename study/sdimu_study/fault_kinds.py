@@ -23,28 +23,19 @@ _ARCMIN = np.pi / 180.0 / 60.0
 
 @dataclass(frozen=True)
 class Fault:
-    """A kind of fault.
-
-    Attributes
-    ----------
-    what : str
-        In a few words, for people.
-    unit : str
-        Of `sizes`.
-    sizes : tuple of float, length 5
-        From hardly visible to gross.
-    samples : callable or None
-        (recording, size, rng) -> recording as its messages arrive.
-    motion : callable or None
-        (motion, phases of the undisturbed test, size, rng) -> motion.
-    """
+    """A kind of fault."""
 
     name: str
     what: str
+    """In a few words, for people."""
     unit: str
+    """Of `sizes`."""
     sizes: tuple[float, float, float, float, float]
+    """From hardly visible to gross, length 5."""
     samples: Callable[[Recording, float, Rng], Recording] | None = None
+    """(recording, size, rng) -> recording as its messages arrive."""
     motion: Callable[[PlatformMotion, Recording, float, Rng], PlatformMotion] | None = None
+    """(motion, phases of the undisturbed test, size, rng) -> motion."""
 
 
 def stretches(recording: Recording, dwell: bool) -> list[tuple[float, float]]:

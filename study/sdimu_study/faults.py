@@ -33,29 +33,19 @@ _DWELL_S = 20.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a test with a fault.
-
-    Attributes
-    ----------
-    fault : str
-    size : float
-    seed : int
-    verdict : str
-        ``ok`` (within `LIMIT`, nothing noted), ``noted`` (within it, and the data section names a fault), ``warned``
-        (outside, and the result says that it is not to be trusted), ``refused`` (`DataError`), ``SILENT WRONG``,
-        ``traceback``.
-    worst : float
-        Largest error in sigmas; NaN without a result.
-    said : tuple of str
-        What the result, or the refusal, says.
-    """
+    """What became of a test with a fault."""
 
     fault: str
     size: float
     seed: int
     verdict: str
+    """``ok`` (within `LIMIT`, nothing noted), ``noted`` (within it, and the data section names a fault), ``warned``
+    (outside, and the result says that it is not to be trusted), ``refused`` (`DataError`), ``SILENT WRONG``,
+    ``traceback``."""
     worst: float
+    """Largest error in sigmas; NaN without a result."""
     said: tuple[str, ...]
+    """What the result, or the refusal, says."""
 
 
 @dataclass(frozen=True)

@@ -40,31 +40,20 @@ _STEADY = 4.0
 
 @dataclass(frozen=True)
 class Sizes:
-    """One sigma of every candidate on a clean test.
-
-    Attributes
-    ----------
-    plan : str
-    latitude_deg : float
-    family, label : tuple of str
-    sigma : tuple of float
-        SI; inf where a plan cannot test it.
-    retention : tuple of float
-        Share of the signature that the model's coefficients leave.
-    prior : tuple of float
-        Physical one-sigma size for the IMU's grade (SI).
-    stops : tuple of (int, float, float)
-        Index, start and end (s) of every dwell.
-    """
+    """One sigma of every candidate on a clean test."""
 
     plan: str
     latitude_deg: float
     family: tuple[str, ...]
     label: tuple[str, ...]
     sigma: tuple[float, ...]
+    """SI; inf where a plan cannot test it."""
     retention: tuple[float, ...]
+    """Share of the signature that the model's coefficients leave."""
     prior: tuple[float, ...]
+    """Physical one-sigma size for the IMU's grade (SI)."""
     stops: tuple[tuple[int, float, float], ...]
+    """Index, start and end (s) of every dwell."""
 
 
 def sizes(plan: str, latitude_deg: float, imu: ImuSpecification, model: Model) -> Sizes:

@@ -17,23 +17,15 @@ OUTSIDE = "outside"
 
 @dataclass(frozen=True)
 class Shape:
-    """An error of one sensor of unit size.
-
-    Attributes
-    ----------
-    label : str
-        ``outside: sensor: formula``.
-    sensor : str
-    formula : str
-        For the simulator, without the size; rad/s or m/s^2 per unit of the size.
-    value : callable
-        The same of `Motion`, shape (n,).
-    """
+    """An error of one sensor of unit size."""
 
     label: str
+    """``outside: sensor: formula``."""
     sensor: str
     formula: str
+    """For the simulator, without the size; rad/s or m/s^2 per unit of the size."""
     value: Callable[[Motion], Floats]
+    """The same of `Motion`, shape (n,)."""
 
     def effect(self) -> Effect:
         """Return the shape as an effect of which the evidence can say the sigma."""

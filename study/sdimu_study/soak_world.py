@@ -77,36 +77,23 @@ def stretched(plan: Plan, profile: TemperatureProfile) -> Plan:
 
 @dataclass(frozen=True)
 class SoakWorld:
-    """Draws of one set.
-
-    Attributes
-    ----------
-    unit : Unit
-    site : Site
-    plan : Plan
-        Of the soaks.
-    effects : tuple of str
-        Of the unit: polynomials with sizes.
-    turn_on : dict of str to float
-        Scatter of the biases (SI).
-    soaks_degc : tuple of float
-    rate_k_s : float
-        Of the ramps.
-    lag_s : float
-        Of the sensors behind the thermometer.
-    noise : tuple of str
-        Noise with a memory.
-    """
+    """Draws of one set."""
 
     unit: Unit
     site: Site
     plan: Plan
+    """Of the soaks."""
     effects: tuple[str, ...]
+    """Of the unit: polynomials with sizes."""
     turn_on: dict[str, float]
+    """Scatter of the biases (SI)."""
     soaks_degc: tuple[float, ...] = SOAKS_DEGC
     rate_k_s: float = _RAMP_K_S
+    """Of the ramps."""
     lag_s: float = 0.0
+    """Of the sensors behind the thermometer."""
     noise: tuple[str, ...] = ()
+    """Noise with a memory."""
 
     def scenarios(self) -> list[Scenario]:
         """Five soaks, a ramp up, and a ramp down in the power-on of the ramp up."""

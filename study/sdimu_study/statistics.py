@@ -44,26 +44,18 @@ class Check:
 
 @dataclass(frozen=True)
 class CoefficientStatistics:
-    """Statistics of n runs for p coefficients; arrays of shape (p,), SI.
-
-    Attributes
-    ----------
-    names : tuple of str
-    bias, bias_error : ndarray
-        Mean error and its standard error.
-    rms, sigma, bound : ndarray
-        RMS error, RMS of the reported sigma, bound of the plan.
-    rms_z : ndarray
-        RMS of error over its own reported sigma.
-    """
+    """Statistics of n runs for p coefficients; arrays of shape (p,), SI."""
 
     names: tuple[str, ...]
     bias: Floats
     bias_error: Floats
+    """`bias`, `bias_error`: Mean error and its standard error."""
     rms: Floats
     sigma: Floats
     bound: Floats
+    """`rms`, `sigma`, `bound`: RMS error, RMS of the reported sigma, bound of the plan."""
     rms_z: Floats
+    """RMS of error over its own reported sigma."""
 
 
 def chi_square_interval(dof: float, level: float = LEVEL) -> tuple[float, float]:

@@ -43,27 +43,18 @@ Column = tuple[str, Callable[[Group], str]]
 
 @dataclass(frozen=True)
 class Study(Generic[Case, World, Found]):
-    """One question to the method.
-
-    Attributes
-    ----------
-    name : str
-        Part of the key of its runs.
-    world : callable
-        ``world(case, seed)`` draws and simulates a test; the case is what is varied.
-    run : callable
-        ``run(world)`` calibrates or diagnoses it, and does not look at what the world knows to be true.
-    score : callable
-        ``score(world, found)`` holds what was found against the truth: a row, as JSON knows it.
-    columns : sequence of (str, callable)
-        Heading, and what makes a cell of the rows of a line.
-    """
+    """One question to the method."""
 
     name: str
+    """Part of the key of its runs."""
     world: Callable[[Case, int], World]
+    """``world(case, seed)`` draws and simulates a test; the case is what is varied."""
     run: Callable[[World], Found]
+    """``run(world)`` calibrates or diagnoses it, and does not look at what the world knows to be true."""
     score: Callable[[World, Found], Row]
+    """``score(world, found)`` holds what was found against the truth: a row, as JSON knows it."""
     columns: Sequence[Column] = ()
+    """Heading, and what makes a cell of the rows of a line."""
 
     def of(self, case: Case) -> Runs[Case, World, Found]:
         """Return the work of a case: one row a seed."""

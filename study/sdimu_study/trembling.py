@@ -35,25 +35,16 @@ Spans = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Trembling:
-    """A run, and when it rested.
-
-    Attributes
-    ----------
-    test : PreparedTest
-    model : Model
-    sensor : ImuTruth
-        Biases in the mean over the rests.
-    known : tuple of (float, float)
-        Begin and end of every rest (s).
-    told : dict
-        What was drawn, for the row.
-    """
+    """A run, and when it rested."""
 
     test: PreparedTest
     model: Model
     sensor: ImuTruth
+    """Biases in the mean over the rests."""
     known: Spans
+    """Begin and end of every rest (s)."""
     told: Mapping[str, Any]
+    """What was drawn, for the row."""
 
 
 def world(case: Key, seed: int) -> Trembling:

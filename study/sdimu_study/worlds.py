@@ -59,53 +59,34 @@ _SPAN = (10.0, 30.0)
 
 @dataclass(frozen=True)
 class Truth:
-    """A hidden effect.
-
-    Attributes
-    ----------
-    name : str
-        Of the parameter, as the registry has it.
-    family : str
-    option : tuple of (str, float) or None
-        What enters nonlinearly: ``("tau", 730.0)``.
-    value : float
-        SI.
-    sigmas : float
-        Size in the sigma of a clean test.
-    text : str
-        What the simulator takes.
-    """
+    """A hidden effect."""
 
     name: str
+    """Of the parameter, as the registry has it."""
     family: str
     option: tuple[str, float] | None
+    """What enters nonlinearly: ``("tau", 730.0)``."""
     value: float
+    """SI."""
     sigmas: float
+    """Size in the sigma of a clean test."""
     text: str
+    """What the simulator takes."""
 
 
 @dataclass(frozen=True)
 class OneTest:
-    """A simulated test, opened, with its truth.
-
-    Attributes
-    ----------
-    test : PreparedTest
-    model : Model
-        To be estimated.
-    sensor : ImuTruth
-        Biases in the mean over the dwells.
-    truths : tuple of Truth
-        What is hidden in it.
-    told : dict
-        What was drawn, for the row.
-    """
+    """A simulated test, opened, with its truth."""
 
     test: PreparedTest
     model: Model
+    """To be estimated."""
     sensor: ImuTruth
+    """Biases in the mean over the dwells."""
     truths: tuple[Truth, ...] = ()
+    """What is hidden in it."""
     told: Mapping[str, Any] = field(default_factory=dict)
+    """What was drawn, for the row."""
 
     @property
     def truth(self) -> Truth | None:

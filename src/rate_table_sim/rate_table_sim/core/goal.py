@@ -31,52 +31,34 @@ _SAME_RAD = math.radians(0.01)
 
 @dataclass(frozen=True)
 class AxisState:
-    """Where the axes are.
-
-    Attributes
-    ----------
-    angle, rate : ndarray, shape (3,)
-        rad, rad/s.
-    """
+    """Where the axes are."""
 
     angle: Floats
     rate: Floats
+    """`angle`, `rate`: rad, rad/s, shape (3,)."""
 
 
 @dataclass(frozen=True)
 class GoalPoint:
-    """A point of a goal.
-
-    Attributes
-    ----------
-    time_s : float
-        From the start of the goal.
-    angle : ndarray, shape (3,)
-        rad.
-    rate, acceleration : ndarray, shape (3,), or None
-        rad/s, rad/s^2.
-    """
+    """A point of a goal."""
 
     time_s: float
+    """From the start of the goal."""
     angle: Floats
+    """rad, shape (3,)."""
     rate: Floats | None = None
     acceleration: Floats | None = None
+    """`rate`, `acceleration`: rad/s, rad/s^2, shape (3,)."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """A trajectory, its joints in the order of the table's axes.
-
-    Attributes
-    ----------
-    name : str
-        To answer with.
-    start_s : float or None
-        Time of the table at which it starts; None is now.
-    """
+    """A trajectory, its joints in the order of the table's axes."""
 
     name: str
+    """To answer with."""
     start_s: float | None
+    """Time of the table at which it starts; None is now."""
     points: tuple[GoalPoint, ...]
 
 

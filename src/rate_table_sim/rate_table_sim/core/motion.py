@@ -19,34 +19,24 @@ from sdimu_calibration.core.table.gimbals import assign_turns
 
 @dataclass(frozen=True)
 class TableMotion:
-    """What the table does, at its sample rate, both ends included.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Seconds from the start.
-    angle, rate : ndarray, shape (n, 3)
-        Axis angles (rad, not wrapped) and rates (rad/s): outer, middle, inner; about x, y, z when free.
-    encoder_angle : ndarray, shape (n, 3)
-        Angles as the encoders read them (rad).
-    stop : ndarray of int, shape (n,)
-        Index of the stop; while rotating, of the stop that was left.
-    dwell : ndarray of bool, shape (n,)
-        Phase that holds from the sample on.
-    q_nt : ndarray, shape (n, 4)
-        True orientation of the platform against NED, scalar first.
-    omega_nt_t : ndarray, shape (n, 3)
-        True rate of the platform against NED, in t (rad/s).
-    """
+    """What the table does, at its sample rate, both ends included."""
 
     t: Floats
+    """Seconds from the start, shape (n,)."""
     angle: Floats
     rate: Floats
+    """`angle`, `rate`: Shape (n, 3). Axis angles (rad, not wrapped) and rates (rad/s): outer, middle, inner; about x,
+    y, z when free."""
     encoder_angle: Floats
+    """Angles as the encoders read them (rad), shape (n, 3)."""
     stop: Ints
+    """Shape (n,). Index of the stop; while rotating, of the stop that was left."""
     dwell: Bools
+    """Phase that holds from the sample on, shape (n,)."""
     q_nt: Floats
+    """True orientation of the platform against NED, scalar first, shape (n, 4)."""
     omega_nt_t: Floats
+    """True rate of the platform against NED, in t (rad/s), shape (n, 3)."""
     names: tuple[str, str, str]
 
 

@@ -17,22 +17,15 @@ _ON_GRID = 1e-6
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """Rate up, constant, down; every breakpoint is a sample.
-
-    Attributes
-    ----------
-    samples, ramp_samples : int
-        Length of the turn and of each ramp, in sample intervals.
-    step_s : float
-        Sample interval.
-    angle_rad : float
-        Signed.
-    """
+    """Rate up, constant, down; every breakpoint is a sample."""
 
     samples: int
     ramp_samples: int
+    """`samples`, `ramp_samples`: Length of the turn and of each ramp, in sample intervals."""
     step_s: float
+    """Sample interval."""
     angle_rad: float
+    """Signed."""
 
     @property
     def peak_rate(self) -> float:

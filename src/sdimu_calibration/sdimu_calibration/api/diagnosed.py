@@ -14,15 +14,10 @@ from sdimu_calibration.report.unknown_section import followed
 
 
 class Diagnosed(ABC):
-    """A diagnosis: verdict, sentence, probabilities, advice; ``repr`` is sentence and advice, as HTML in a notebook.
-
-    Attributes
-    ----------
-    core : Diagnosis or SetDiagnosis
-        What it shows, in the words of the core.
-    """
+    """A diagnosis: verdict, sentence, probabilities, advice; ``repr`` is sentence and advice, as HTML in a notebook."""
 
     core: Diagnosis | SetDiagnosis
+    """What it shows, in the words of the core."""
 
     @property
     def verdict(self) -> str:

@@ -36,19 +36,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class OpenedSet:
-    """Recordings of one unit, ready to be fitted together; each is read when it is needed.
-
-    Attributes
-    ----------
-    workers : int
-        Processes that read them.
-    kept : Path or None
-        Folder in which what they say is kept from one call to the next.
-    """
+    """Recordings of one unit, ready to be fitted together; each is read when it is needed."""
 
     core: RecordingSet
     workers: int = 1
+    """Processes that read them."""
     kept: Path | None = None
+    """Folder in which what they say is kept from one call to the next."""
 
     @property
     def members(self) -> tuple[Member, ...]:

@@ -107,21 +107,15 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
 
 @dataclass(frozen=True)
 class Findings:
-    """What a diagnosis leaves, and where.
-
-    Attributes
-    ----------
-    title : str
-        Of the page.
-    null : Null or None
-        Of a bootstrap.
-    """
+    """What a diagnosis leaves, and where."""
 
     about: Asked
     title: str
+    """Of the page."""
     summary: DiagnosisSummary
     more: ReportExtras
     null: Null | None
+    """Of a bootstrap."""
 
 
 def _write(what: Findings, trace: Trace) -> None:

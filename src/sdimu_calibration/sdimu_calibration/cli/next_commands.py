@@ -40,19 +40,13 @@ def check_plan_room(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a verb was asked for, so far as the next one has to repeat it.
-
-    Attributes
-    ----------
-    options : sequence of str
-        As words of a command.
-    place : sequence of str
-        Site and IMU alone, likewise.
-    """
+    """What a verb was asked for, so far as the next one has to repeat it."""
 
     bags: Sequence[Path]
     options: Sequence[str]
+    """As words of a command."""
     place: Sequence[str]
+    """Site and IMU alone, likewise."""
     folder: Path
 
     @classmethod

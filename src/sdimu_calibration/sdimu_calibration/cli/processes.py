@@ -80,26 +80,18 @@ def enter_domain(domain: int) -> None:
 
 @dataclass(frozen=True)
 class RunningTest:
-    """A test that a run of `sdimu` on this machine makes, as it tells those that watch it.
-
-    Attributes
-    ----------
-    folder : str
-        Of its results.
-    duration_s : float
-        0 where nobody knows.
-    stops : int
-        0 where nobody knows.
-    start_ns : int
-        Stamp of its begin.
-    """
+    """A test that a run of `sdimu` on this machine makes, as it tells those that watch it."""
 
     folder: str
+    """Of its results."""
     duration_s: float = 0.0
+    """0 where nobody knows."""
     stops: int = 0
+    """0 where nobody knows."""
     model: str = "baseline"
     imu: str = "dtg"
     start_ns: int = 0
+    """Stamp of its begin."""
     domain: int = 0
 
 

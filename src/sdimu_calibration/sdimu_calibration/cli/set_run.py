@@ -34,18 +34,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SetRequest:
-    """What the user asks of a set.
-
-    Attributes
-    ----------
-    bags : sequence of Path
-        None where a set file names them.
-    opening : StatedOpening
-        Of all recordings; what a set file says of one comes first.
-    """
+    """What the user asks of a set."""
 
     bags: Sequence[Path]
+    """None where a set file names them."""
     opening: StatedOpening
+    """Of all recordings; what a set file says of one comes first."""
     request: FitRequest
 
     @property

@@ -156,15 +156,10 @@ def _end(is_over: bool, seconds: float, folder: str) -> End:
 
 @dataclass
 class Pace:
-    """How long a test has taken, told from its pace since it is watched: it may have begun long before.
-
-    Attributes
-    ----------
-    joined : tuple of float or None
-        Time of the test and wall time (s) when it was first heard.
-    """
+    """How long a test has taken, told from its pace since it is watched: it may have begun long before."""
 
     joined: tuple[float, float] | None = None
+    """Time of the test and wall time (s) when it was first heard."""
 
     def wall(self, table_s: float, wall_s: float) -> float:
         """Wall time (s) that the test has taken so far at this pace; 0 while it is unknown."""

@@ -94,19 +94,12 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Advice:
-    """One thing to do.
-
-    Attributes
-    ----------
-    arguments : tuple
-        As `kind` says.
-    verb : Verb or None
-        The work, where it can be done at once.
-    about : tuple of str
-        What it is done with.
-    """
+    """One thing to do."""
 
     kind: Kind
     arguments: tuple[Any, ...] = ()
+    """As `kind` says."""
     verb: Verb | None = None
+    """The work, where it can be done at once."""
     about: tuple[str, ...] = ()
+    """What it is done with."""

@@ -29,21 +29,14 @@ _PURE = re.compile(r"[-+\d.eE\s]*")
 
 @dataclass(frozen=True)
 class EffectKey:
-    """An effect as people name it.
-
-    Attributes
-    ----------
-    name : str
-        Registered effect, coefficient, ``SENSOR: FORMULA``, or path of an effect file (``:COEFFICIENT`` behind it).
-    options : mapping of str to str
-        Fixed quantities with their units, such as ``{"tau": "300 s"}``.
-    size : str
-        Quantity with its unit, or empty.
-    """
+    """An effect as people name it."""
 
     name: str
+    """Registered effect, coefficient, ``SENSOR: FORMULA``, or path of an effect file (``:COEFFICIENT`` behind it)."""
     options: Mapping[str, str] = field(default_factory=dict)
+    """Fixed quantities with their units, such as ``{"tau": "300 s"}``."""
     size: str = ""
+    """Quantity with its unit, or empty."""
 
     def __str__(self) -> str:
         """Write the key in its canonical spelling."""

@@ -52,54 +52,40 @@ _FAR = 5.0
 
 @dataclass(frozen=True)
 class EpochEstimate:
-    """What the filter knows at the end of an epoch.
-
-    Attributes
-    ----------
-    ns : int
-        Stamp of the end of the epoch (ns).
-    t : float
-        The same in seconds after the origin of the recording.
-    dwell, used : bool
-        At rest; a measurement was taken.
-    names, units, display_units : tuple of str, length p
-    coefficients, covariance : ndarray, shapes (p,) and (p, p)
-        SI, in `body_frame`.
-    position_error_m, velocity : ndarray, shape (3,)
-        N, E, D against the known point (m); N, E, D (m/s).
-    q_nb : ndarray, shape (4,)
-        Scalar first.
-    navigation_covariance : ndarray, shape (9, 9)
-    nis : dict
-        Mean squared normalised innovation per degree of freedom so far, by channel of `NIS_CHANNELS`.
-    stop_nis : dict
-        The same at the present stop, or the last one: what the verdict is about.
-    verdict : str
-        ``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about
-        what it did not know yet, so the first stops may complain about a wrong initial azimuth.
-    counts : dict
-        samples, late, lost, rejected, contradicted.
-    """
+    """What the filter knows at the end of an epoch."""
 
     ns: int
+    """Stamp of the end of the epoch (ns)."""
     t: float
+    """The same in seconds after the origin of the recording."""
     dwell: bool
     used: bool
+    """`dwell`, `used`: At rest; a measurement was taken."""
     stop: int
     body_frame: str
     names: tuple[str, ...]
     units: tuple[str, ...]
     display_units: tuple[str, ...]
+    """`names`, `units`, `display_units`: Length p."""
     coefficients: Floats
     covariance: Floats
+    """`coefficients`, `covariance`: SI, in `body_frame`, shapes (p,) and (p, p)."""
     position_error_m: Floats
     velocity: Floats
+    """`position_error_m`, `velocity`: Shape (3,). N, E, D against the known point (m); N, E, D (m/s)."""
     q_nb: Floats
+    """Scalar first, shape (4,)."""
     navigation_covariance: Floats
+    """Shape (9, 9)."""
     nis: dict[str, float]
+    """Mean squared normalised innovation per degree of freedom so far, by channel of `NIS_CHANNELS`."""
     stop_nis: dict[str, float]
+    """The same at the present stop, or the last one: what the verdict is about."""
     verdict: str
+    """``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about
+    what it did not know yet, so the first stops may complain about a wrong initial azimuth."""
     counts: dict[str, int]
+    """samples, late, lost, rejected, contradicted."""
 
 
 class LiveCalibration:

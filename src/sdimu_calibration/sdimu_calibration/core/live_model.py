@@ -36,24 +36,16 @@ SQUARES = (
 
 @dataclass(frozen=True)
 class LiveModel:
-    """Model of the filter on the way.
-
-    Attributes
-    ----------
-    asked : ImuModel
-        Coefficients that are reported, p of them.
-    setup : TestSetup
-        With all that is estimated, q parameters.
-    noise : NoiseStates or None
-        Where noise with a memory stands among them.
-    azimuth_free : bool
-        The horizontal Earth rate is estimated in the place of the azimuth.
-    """
+    """Model of the filter on the way."""
 
     asked: ImuModel
+    """Coefficients that are reported, p of them."""
     setup: TestSetup
+    """With all that is estimated, q parameters."""
     noise: NoiseStates | None
+    """Where noise with a memory stands among them."""
     azimuth_free: bool
+    """The horizontal Earth rate is estimated in the place of the azimuth."""
 
     @property
     def notes(self) -> list[str]:

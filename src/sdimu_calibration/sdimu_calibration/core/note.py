@@ -24,15 +24,10 @@ MISFITS = frozenset({Topic.MISFIT, Topic.DIFFERS})
 
 
 class Note(str):
-    """A line of which programs ask what it is about; its end may advise a diagnosis.
-
-    Attributes
-    ----------
-    bare : str
-        The line of a fit that was diagnosed: without the end.
-    """
+    """A line of which programs ask what it is about; its end may advise a diagnosis."""
 
     bare: str
+    """The line of a fit that was diagnosed: without the end."""
     topic: Topic | None
 
     def __new__(cls, text: str, topic: Topic | None = None, end: str = "") -> Note:

@@ -16,42 +16,29 @@ _BLOCK_S = 1.0
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a result is from; empty or NaN where nobody said it.
-
-    Attributes
-    ----------
-    serial : str
-        Serial number of the unit.
-    power_on : str
-        Name or number of the time from switch-on to switch-off.
-    start_ns : int
-        First stamp (ns since 1970); 0 unknown.
-    temperature_degc : float
-        Mean over the recording (deg C).
-    temperature_low_degc, temperature_high_degc : float
-        Lowest and highest in the recording (deg C).
-    rate_rad_s : float
-        Largest mean of the body rate over a second (rad/s).
-    recording : str
-        Name of the bag.
-    imu, site : str
-        Names of their files.
-    imu_file, site_file : str
-        Paths of these files where the user named a path; empty for a name in config/.
-    """
+    """Where a result is from; empty or NaN where nobody said it."""
 
     serial: str = ""
+    """Serial number of the unit."""
     power_on: str = ""
+    """Name or number of the time from switch-on to switch-off."""
     start_ns: int = 0
+    """First stamp (ns since 1970); 0 unknown."""
     temperature_degc: float = math.nan
+    """Mean over the recording (deg C)."""
     temperature_low_degc: float = math.nan
     temperature_high_degc: float = math.nan
+    """`temperature_low_degc`, `temperature_high_degc`: Lowest and highest in the recording (deg C)."""
     rate_rad_s: float = math.nan
+    """Largest mean of the body rate over a second (rad/s)."""
     recording: str = ""
+    """Name of the bag."""
     imu: str = ""
     site: str = ""
+    """`imu`, `site`: Names of their files."""
     imu_file: str = ""
     site_file: str = ""
+    """`imu_file`, `site_file`: Paths of these files where the user named a path; empty for a name in config/."""
 
     def stated(self, serial: str | None, power_on: str | None) -> Origin:
         """Return it with what the user states; None leaves what the bag says."""

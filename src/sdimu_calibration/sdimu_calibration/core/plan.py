@@ -7,21 +7,14 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Turn:
-    """One rotation of the table.
-
-    Attributes
-    ----------
-    axis : str
-        ``X``, ``Y`` or ``Z``: the IMU axis about which the table turns, right-hand positive.
-    angle_rad : float
-        Signed angle.
-    rate_rad_s : float
-        Mean rate over the turn (> 0).
-    """
+    """One rotation of the table."""
 
     axis: str
+    """``X``, ``Y`` or ``Z``: the IMU axis about which the table turns, right-hand positive."""
     angle_rad: float
+    """Signed angle."""
     rate_rad_s: float
+    """Mean rate over the turn (> 0)."""
 
     @property
     def duration_s(self) -> float:
@@ -31,20 +24,14 @@ class Turn:
 
 @dataclass(frozen=True)
 class Plan:
-    """Stops and turns: dwell 0, turn 0, dwell 1, ... turn n-1, dwell n.
-
-    Attributes
-    ----------
-    dwell_s : tuple of float
-        Length of each stop (s), one more than turns.
-    acceleration_rad_s2 : float
-        Limit of the angular acceleration.
-    """
+    """Stops and turns: dwell 0, turn 0, dwell 1, ... turn n-1, dwell n."""
 
     name: str
     dwell_s: tuple[float, ...]
+    """Length of each stop (s), one more than turns."""
     turns: tuple[Turn, ...]
     acceleration_rad_s2: float
+    """Limit of the angular acceleration."""
 
     @property
     def duration_s(self) -> float:

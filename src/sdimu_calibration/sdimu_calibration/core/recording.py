@@ -39,50 +39,33 @@ class DivergedError(DataError):
 
 @dataclass(frozen=True)
 class DataFault:
-    """Something wrong with the data that is no physics of the sensor.
-
-    Attributes
-    ----------
-    kind : str
-        ``gap``, ``stuck``, ``saturated``, ``spike``, ``motion at rest``, ``status``, ...
-    text : str
-        One line for people.
-    count : int
-        Samples, or seconds of status, concerned.
-    start_s, end_s : float
-        First and last time (s); NaN where that has no meaning.
-    grave : bool
-        The estimate is not to be trusted until someone has looked at it.
-    """
+    """Something wrong with the data that is no physics of the sensor."""
 
     kind: str
+    """``gap``, ``stuck``, ``saturated``, ``spike``, ``motion at rest``, ``status``, ..."""
     text: str
+    """One line for people."""
     count: int = 0
+    """Samples, or seconds of status, concerned."""
     start_s: float = float("nan")
     end_s: float = float("nan")
+    """`start_s`, `end_s`: First and last time (s); NaN where that has no meaning."""
     grave: bool = False
+    """The estimate is not to be trusted until someone has looked at it."""
 
 
 @dataclass(frozen=True)
 class PhaseLog:
-    """What the rate table said about itself; each entry holds from its time on.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-        Seconds after the recording's `start_ns`, ascending.
-    dwell : ndarray of bool, shape (m,)
-        True for ``dwell``, False for ``rotating``.
-    stop : ndarray of int, shape (m,)
-        Index of the stop; `UNNUMBERED` where nobody says it.
-    stated : bool
-        Somebody says it; else it was detected from the samples.
-    """
+    """What the rate table said about itself; each entry holds from its time on."""
 
     t: Floats
+    """Seconds after the recording's `start_ns`, ascending, shape (m,)."""
     dwell: Bools
+    """True for ``dwell``, False for ``rotating``, shape (m,)."""
     stop: Ints
+    """Shape (m,). Index of the stop; `UNNUMBERED` where nobody says it."""
     stated: bool = True
+    """Somebody says it; else it was detected from the samples."""
 
     def usual_dwell_s(self, until_s: float) -> float | None:
         """Median length of a dwell (s) in a recording that ends at `until_s`; None where there is no dwell."""
@@ -104,22 +87,15 @@ class PhaseLog:
 
 @dataclass(frozen=True)
 class TemperatureLog:
-    """IMU temperature.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-        Seconds after `start_ns` (s), ascending.
-    value : ndarray, shape (m,)
-        deg C.
-    reference_degc : float or None
-        Temperature T0 from which effects count (deg C): the same for recordings that share coefficients; None: the
-        first value.
-    """
+    """IMU temperature."""
 
     t: Floats
+    """Seconds after `start_ns` (s), ascending, shape (m,)."""
     value: Floats
+    """deg C, shape (m,)."""
     reference_degc: float | None = None
+    """Temperature T0 from which effects count (deg C): the same for recordings that share coefficients; None: the first
+    value."""
 
     @property
     def origin_degc(self) -> float:
@@ -129,39 +105,26 @@ class TemperatureLog:
 
 @dataclass(frozen=True)
 class TableLog:
-    """Table axis angles; never used by the estimator.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-        Seconds after `start_ns` (s).
-    names : tuple of str, length k
-    angle : ndarray, shape (m, k)
-        rad.
-    """
+    """Table axis angles; never used by the estimator."""
 
     t: Floats
+    """Seconds after `start_ns` (s), shape (m,)."""
     names: tuple[str, ...]
+    """Length k."""
     angle: Floats
+    """rad, shape (m, k)."""
 
 
 class ClockStep(NamedTuple):
-    """A step of the clock of the stamps, taken out of them.
-
-    Attributes
-    ----------
-    t : float
-        Time of the first sample after it (s after the start of the recording).
-    size_s : float
-        How far the clock was set on; below zero: back (s).
-    open : float
-        Sigma of the angle that was turned in the length of the step, as a share of it: 1 / sqrt(3) where the driver may
-        have paused instead, less where gravity tells.
-    """
+    """A step of the clock of the stamps, taken out of them."""
 
     t: float
+    """Time of the first sample after it (s after the start of the recording)."""
     size_s: float
+    """How far the clock was set on; below zero: back (s)."""
     open: float = 1.0 / math.sqrt(3.0)
+    """Sigma of the angle that was turned in the length of the step, as a share of it: 1 / sqrt(3) where the driver may
+    have paused instead, less where gravity tells."""
 
     def __str__(self) -> str:
         """Say it in a few words."""

@@ -31,30 +31,23 @@ NO_AXES = (float("nan"),) * 3
 
 @dataclass(frozen=True)
 class History:
-    """The closed-loop filter as the test went on, one row an epoch (m), in the reported body frame.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-        End of the epoch (s).
-    value, sigma : ndarray, shape (m, p)
-        Coefficients (SI).
-    attitude_sigma : ndarray, shape (m, 3)
-        N, E, D (rad).
-    stop : ndarray of int, shape (m,)
-    dwell, used : ndarray of bool, shape (m,)
-    nis : ndarray, shape (m, 4)
-        Squared normalised innovation of position, velocity, rate, force (3 degrees of freedom each); NaN unmeasured.
-    """
+    """The closed-loop filter as the test went on, one row an epoch (m), in the reported body frame."""
 
     t: Floats
+    """End of the epoch (s), shape (m,)."""
     value: Floats
     sigma: Floats
+    """`value`, `sigma`: Coefficients (SI), shape (m, p)."""
     attitude_sigma: Floats
+    """N, E, D (rad), shape (m, 3)."""
     stop: Ints
+    """Shape (m,)."""
     dwell: Bools
     used: Bools
+    """`dwell`, `used`: Shape (m,)."""
     nis: Floats
+    """Shape (m, 4). Squared normalised innovation of position, velocity, rate, force (3 degrees of freedom each); NaN
+    unmeasured."""
 
 
 def no_history(p: int) -> History:
@@ -67,142 +60,104 @@ def no_history(p: int) -> History:
 
 @dataclass(frozen=True)
 class Rest:
-    """A rest of a run by hand, and what the fit leaves over there; residuals are measured less predicted.
-
-    Attributes
-    ----------
-    start_s, end_s : float
-        Seconds.
-    rate, force : tuple of three float
-        Residuals of the means, in the axes of the IMU (rad/s, m/s^2).
-    turn : tuple of three float
-        Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it.
-    rate_sigma, force_sigma, turn_sigma : float
-        What they scatter by an axis: white noise, and what was learned beyond it (rad/s, m/s^2, rad).
-    ahead, ahead_sigma : tuple of three float
-        Error of the force predicted from everything but itself, and what it scatters by (m/s^2); NaN in results of
-        before.
-    """
+    """A rest of a run by hand, and what the fit leaves over there; residuals are measured less predicted."""
 
     start_s: float
     end_s: float
+    """`start_s`, `end_s`: Seconds."""
     rate: tuple[float, float, float]
     force: tuple[float, float, float]
+    """`rate`, `force`: Residuals of the means, in the axes of the IMU (rad/s, m/s^2)."""
     turn: tuple[float, float, float]
+    """Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it."""
     rate_sigma: float
     force_sigma: float
     turn_sigma: float
+    """`rate_sigma`, `force_sigma`, `turn_sigma`: What they scatter by an axis: white noise, and what was learned beyond
+    it (rad/s, m/s^2, rad)."""
     ahead: tuple[float, float, float] = NO_AXES
     ahead_sigma: tuple[float, float, float] = NO_AXES
+    """`ahead`, `ahead_sigma`: Error of the force predicted from everything but itself, and what it scatters by (m/s^2);
+    NaN in results of before."""
 
 
 @dataclass(frozen=True)
 class TurnOn:
-    """Scatter of the coefficients of an effect from power-on to power-on.
-
-    Attributes
-    ----------
-    sigma, low, high : float
-        Standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not show any scatter.
-    power_ons : int
-        Number of power-ons that were seen.
-    """
+    """Scatter of the coefficients of an effect from power-on to power-on."""
 
     effect: str
     sigma: float
     low: float
     high: float
+    """`sigma`, `low`, `high`: Standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not
+    show any scatter."""
     power_ons: int
+    """Number of power-ons that were seen."""
     unit: str = ""
     display_unit: str = ""
 
 
 @dataclass(frozen=True)
 class SetRecording:
-    """One recording of a set.
-
-    Attributes
-    ----------
-    start_ns : int
-        Stamp of its start.
-    temperature_degc : float
-        Mean; NaN where it is not recorded.
-    duration_s, samples, nis : float
-        Length (s), number of samples, mean normalised innovation squared (1).
-    values, sigma : ndarray, shape (p,)
-        Of its own fit (SI), in the order of the coefficients of the set; NaN where it has none.
-    deviate : ndarray, shape (p,)
-        Its deviation from the joint estimate over the sigma of that (1); NaN where it says nothing.
-    """
+    """One recording of a set."""
 
     name: str
     serial: str
     power_on: str
     start_ns: int
+    """Stamp of its start."""
     temperature_degc: float
+    """Mean; NaN where it is not recorded."""
     duration_s: float
     samples: float
     nis: float
+    """`duration_s`, `samples`, `nis`: Length (s), number of samples, mean normalised innovation squared (1)."""
     values: Floats
     sigma: Floats
+    """`values`, `sigma`: Shape (p,). Of its own fit (SI), in the order of the coefficients of the set; NaN where it has
+    none."""
     deviate: Floats
+    """Shape (p,). Its deviation from the joint estimate over the sigma of that (1); NaN where it says nothing."""
 
 
 @dataclass(frozen=True)
 class PowerOnDeviation:
-    """Deviation of a coefficient in one power-on from its mean over all power-ons that might be.
-
-    Attributes
-    ----------
-    value, sigma : float
-        SI.
-    """
+    """Deviation of a coefficient in one power-on from its mean over all power-ons that might be."""
 
     power_on: str
     name: str
     value: float
     sigma: float
+    """`value`, `sigma`: SI."""
 
 
 @dataclass(frozen=True)
 class SetTrend:
-    """A coefficient that follows something from recording to recording.
-
-    Attributes
-    ----------
-    slope, sigma : float
-        SI per unit of the covariate.
-    p_value : float
-        All coefficients and covariates counted.
-    """
+    """A coefficient that follows something from recording to recording."""
 
     name: str
     covariate: str
     slope: float
     sigma: float
+    """`slope`, `sigma`: SI per unit of the covariate."""
     p_value: float
+    """All coefficients and covariates counted."""
 
 
 @dataclass(frozen=True)
 class SetSummary:
-    """What a joint fit says beyond the coefficients.
-
-    Attributes
-    ----------
-    scatter_p : ndarray, shape (p,)
-        Probability that a constant coefficient scatters as far from recording to recording; NaN where none sees it.
-    trends : tuple of SetTrend
-        The least probable first.
-    left_out : tuple of (str, str)
-        Recordings that could not be used, and why.
-    """
+    """What a joint fit says beyond the coefficients."""
 
     recordings: tuple[SetRecording, ...]
     turn_on: tuple[TurnOn, ...]
     deviations: tuple[PowerOnDeviation, ...]
     scatter_p: Floats
+    """Shape (p,). Probability that a constant coefficient scatters as far from recording to recording; NaN where none
+    sees it."""
     trends: tuple[SetTrend, ...]
+    """The least probable first."""
     left_out: tuple[tuple[str, str], ...] = ()
+    """Recordings that could not be used, and why."""
 
 
 @dataclass(frozen=True)

@@ -13,31 +13,22 @@ _OF = {"normal": "WGS-84 normal gravity at the latitude", "standard": "a convent
 
 @dataclass(frozen=True)
 class Reference:
-    """A quantity of the site that the calibration measures against.
-
-    Attributes
-    ----------
-    name : str
-        As an effect.
-    told, sigma : float
-        As the site tells it (rad, m/s^2); a sigma of zero takes it at its word.
-    value, value_sigma : float
-        With what the data say of it.
-    origin : str
-        ``stated``; of gravity also ``normal`` or ``standard``.
-    relative : tuple of str
-        Coefficients whose common part is the reference: where `sigma` is zero their sigmas are relative to it.
-    """
+    """A quantity of the site that the calibration measures against."""
 
     name: str
+    """As an effect."""
     told: float
     sigma: float
+    """`told`, `sigma`: As the site tells it (rad, m/s^2); a sigma of zero takes it at its word."""
     value: float
     value_sigma: float
+    """`value`, `value_sigma`: With what the data say of it."""
     unit: str = ""
     display_unit: str = ""
     origin: str = "stated"
+    """``stated``; of gravity also ``normal`` or ``standard``."""
     relative: tuple[str, ...] = ()
+    """Coefficients whose common part is the reference: where `sigma` is zero their sigmas are relative to it."""
 
     @property
     def words(self) -> str:

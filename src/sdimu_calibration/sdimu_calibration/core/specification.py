@@ -18,33 +18,24 @@ estimate go with it."""
 
 @dataclass(frozen=True)
 class Site:
-    """Where the test is made.
-
-    Attributes
-    ----------
-    latitude_rad, height_m : float
-        Geodetic latitude and ellipsoidal height.
-    gravity_m_s2 : float or None
-        Measured gravity; None takes WGS-84 normal gravity.
-    initial_azimuth_rad : float or None
-        Azimuth of the body X axis (of Y, when X starts within 45 deg of the vertical) at the start;
-        None gyrocompasses.
-    initial_azimuth_sigma_rad : float
-        Its standard deviation; used only with an azimuth.
-    magnetic_field_t : tuple of float, or None
-        North, East, Down (T), for the effects of magnetism; None takes that of mid-northern latitudes.
-    latitude_sigma_rad, gravity_sigma_m_s2 : float
-        Standard deviation of latitude and gravity as they are told; zero takes them at their word.
-    """
+    """Where the test is made."""
 
     latitude_rad: float
     height_m: float = 0.0
+    """`latitude_rad`, `height_m`: Geodetic latitude and ellipsoidal height."""
     gravity_m_s2: float | None = None
+    """Measured gravity; None takes WGS-84 normal gravity."""
     initial_azimuth_rad: float | None = None
+    """Azimuth of the body X axis (of Y, when X starts within 45 deg of the vertical) at the start; None gyrocompasses.
+    """
     initial_azimuth_sigma_rad: float = np.radians(3.0)
+    """Its standard deviation; used only with an azimuth."""
     magnetic_field_t: tuple[float, float, float] | None = None
+    """North, East, Down (T), for the effects of magnetism; None takes that of mid-northern latitudes."""
     latitude_sigma_rad: float = 0.0
     gravity_sigma_m_s2: float = 0.0
+    """`latitude_sigma_rad`, `gravity_sigma_m_s2`: Standard deviation of latitude and gravity as they are told; zero
+    takes them at their word."""
 
 
 @dataclass(frozen=True)
@@ -139,54 +130,38 @@ class ImuSpecification:
 
 @dataclass(frozen=True)
 class StatedPrior:
-    """What a model states of one coefficient before the test.
-
-    Attributes
-    ----------
-    mean, sigma : float
-        In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean.
-    unit : str
-        In which both were written: tells a wrong one; empty where none was, which only a pure number may have.
-    """
+    """What a model states of one coefficient before the test."""
 
     name: str
     mean: float
     sigma: float
+    """`mean`, `sigma`: In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean."""
     unit: str
+    """In which both were written: tells a wrong one; empty where none was, which only a pure number may have."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is estimated and how the measurements are weighed.
-
-    Attributes
-    ----------
-    effects : tuple of str
-        Names of registered sensor effects, in the order of the state.
-    velocity_sigma, position_sigma : float
-        One-sigma of "the table stands still, at the known point" per epoch (m/s, m).
-    settle_s : float
-        Time after the end of motion in which no measurement is taken (s).
-    body_frame : str
-        Frame of the reported coefficients: ``accelerometer_triad`` or ``prior``.
-    zero_velocity : str
-        When Zp and Zv are taken: ``after_motion`` (once at each stop; later they only repeat what Zf says) or
-        ``every_epoch`` (as the paper).
-    shared_noise : bool
-        Model that the same samples drive the navigation and make Zw and Zf.
-    extra_rate_sigma, extra_force_sigma : float
-        Noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s, m/s^2).
-    priors : tuple of StatedPrior
-        Of single coefficients, in the place of what the IMU's file says of all of an effect.
-    """
+    """What is estimated and how the measurements are weighed."""
 
     effects: tuple[str, ...]
+    """Names of registered sensor effects, in the order of the state."""
     velocity_sigma: float = 2e-5
     position_sigma: float = 1e-3
+    """`velocity_sigma`, `position_sigma`: One-sigma of "the table stands still, at the known point" per epoch (m/s, m).
+    """
     settle_s: float = 1.0
+    """Time after the end of motion in which no measurement is taken (s)."""
     body_frame: str = "accelerometer_triad"
+    """Frame of the reported coefficients: ``accelerometer_triad`` or ``prior``."""
     zero_velocity: str = "after_motion"
+    """When Zp and Zv are taken: ``after_motion`` (once at each stop; later they only repeat what Zf says) or
+    ``every_epoch`` (as the paper)."""
     shared_noise: bool = True
+    """Model that the same samples drive the navigation and make Zw and Zf."""
     extra_rate_sigma: float = 0.0
     extra_force_sigma: float = 0.0
+    """`extra_rate_sigma`, `extra_force_sigma`: Noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s,
+    m/s^2)."""
     priors: tuple[StatedPrior, ...] = ()
+    """Of single coefficients, in the place of what the IMU's file says of all of an effect."""

@@ -74,21 +74,14 @@ class UnitError(ValueError):
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of measurement.
-
-    Attributes
-    ----------
-    text : str
-        As written, for people.
-    factor : float
-        SI value of one unit.
-    dimension : tuple of (str, Fraction)
-        Base dimensions and powers, sorted, zero powers left out.
-    """
+    """A unit of measurement."""
 
     text: str
+    """As written, for people."""
     factor: float
+    """SI value of one unit."""
     dimension: tuple[tuple[str, Fraction], ...]
+    """Base dimensions and powers, sorted, zero powers left out."""
 
 
 @lru_cache(maxsize=1024)

@@ -36,93 +36,62 @@ _NICE = 10
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What holds for all requests to a worker.
-
-    Attributes
-    ----------
-    journal : Path
-        As `Journal.place`.
-    model : str
-        Name or path; empty takes the one for a table, or for a run by hand.
-    question : callable, optional
-        Function of a module that is asked of every fit, as ``question(fit, diagnosis, about)``; its answer must survive
-        `pickle`.
-    pictures : bool
-        Draw each diagnosis.
-    report : Path, optional
-        Folder that gets diagnosis.json and report.html at the end of the test.
-    """
+    """What holds for all requests to a worker."""
 
     journal: Path
+    """As `Journal.place`."""
     options: OpeningOptions
     model: str
+    """Name or path; empty takes the one for a table, or for a run by hand."""
     question: Question | None = None
+    """Function of a module that is asked of every fit, as ``question(fit, diagnosis, about)``; its answer must survive
+    `pickle`."""
     pictures: bool = True
+    """Draw each diagnosis."""
     report: Path | None = None
+    """Folder that gets diagnosis.json and report.html at the end of the test."""
 
 
 @dataclass(frozen=True)
 class WorkerRequest:
-    """Diagnose what there is.
-
-    Attributes
-    ----------
-    until_ns : int or None
-        The last stamp that counts; None for everything.
-    models : tuple of tuple of str
-        What was added to the model, one entry for each model that the test has had, the one in use last.
-    about : object
-        For the question.
-    report : bool
-        Leave the files of `WorkerSetup.report`, too.
-    asked : float
-        When (s of the monotonic clock, which all processes share).
-    """
+    """Diagnose what there is."""
 
     stop: int
     until_ns: int | None
+    """The last stamp that counts; None for everything."""
     models: tuple[tuple[str, ...], ...] = ((),)
+    """What was added to the model, one entry for each model that the test has had, the one in use last."""
     about: Any = None
+    """For the question."""
     report: bool = False
+    """Leave the files of `WorkerSetup.report`, too."""
     asked: float = field(default_factory=time.monotonic)
+    """When (s of the monotonic clock, which all processes share)."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a request.
-
-    Attributes
-    ----------
-    more : object
-        Answer to the question; None without question or fit.
-    seconds : float
-        From the request to the answer.
-    reached_ns : int
-        Stamp of the last sample that was looked at (ns); 0 where there was none.
-    unreported : str
-        Why the files of `WorkerSetup.report` are not there; empty where they are, or none are wanted.
-    """
+    """What came of a request."""
 
     request: WorkerRequest
     diagnosis: LiveDiagnosis
     more: Any
+    """Answer to the question; None without question or fit."""
     seconds: float
+    """From the request to the answer."""
     reached_ns: int
+    """Stamp of the last sample that was looked at (ns); 0 where there was none."""
     unreported: str = ""
+    """Why the files of `WorkerSetup.report` are not there; empty where they are, or none are wanted."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What comes after each answer.
-
-    Attributes
-    ----------
-    png : bytes
-        Of the diagnosis; empty where it waits.
-    """
+    """What comes after each answer."""
 
     request: WorkerRequest
     png: bytes
+    """Of the diagnosis; empty where it waits."""
 
 
 def picture(answer: Answer) -> Picture:

@@ -16,18 +16,12 @@ GREETING_S = 2.0
 
 @dataclass
 class Companion:
-    """A topic that goes with the IMU: status or temperature.
-
-    Attributes
-    ----------
-    latest_ns : int or None
-        Newest stamp of its messages, but for those of no time of the test.
-    heard : float or None
-        Wall time at which that came.
-    """
+    """A topic that goes with the IMU: status or temperature."""
 
     latest_ns: int | None = None
+    """Newest stamp of its messages, but for those of no time of the test."""
     heard: float | None = None
+    """Wall time at which that came."""
 
     def take(self, ns: int, now: float, imu_ns: int = NEVER) -> None:
         """Note a message of stamp `ns` that came at wall time `now`, when `imu_ns` was the newest sample."""

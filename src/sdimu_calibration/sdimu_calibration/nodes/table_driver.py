@@ -56,26 +56,19 @@ SILENCE_S = 120.0
 
 @dataclass(frozen=True)
 class Arrival:
-    """How a move ended.
-
-    Attributes
-    ----------
-    ok : bool
-        The table reached the target and dwelt.
-    reason : str
-        Why not; empty when `ok`.
-    start_ns, arrived_ns, end_ns : int
-        Stamps of the joint states: before the move, at rest on the target, at the end of the dwell.
-    angles : tuple of float
-        Of the joints at the end (rad).
-    """
+    """How a move ended."""
 
     ok: bool
+    """The table reached the target and dwelt."""
     reason: str
+    """Why not; empty when `ok`."""
     start_ns: int
     arrived_ns: int
     end_ns: int
+    """`start_ns`, `arrived_ns`, `end_ns`: Stamps of the joint states: before the move, at rest on the target, at the
+    end of the dwell."""
     angles: tuple[float, ...]
+    """Of the joints at the end (rad)."""
 
 
 class TableDriver:

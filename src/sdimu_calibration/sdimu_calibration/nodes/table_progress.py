@@ -21,22 +21,15 @@ OVERDUE_S = 10.0
 
 @dataclass(frozen=True)
 class Seen:
-    """Joint states in the order of the table's joints.
-
-    Attributes
-    ----------
-    ns : int
-        Stamp.
-    angles, rates : ndarray, shape (3,)
-        rad, rad/s.
-    interval_ns : int
-        Since the joint states before.
-    """
+    """Joint states in the order of the table's joints."""
 
     ns: int
+    """Stamp."""
     angles: Floats
     rates: Floats
+    """`angles`, `rates`: rad, rad/s, shape (3,)."""
     interval_ns: int
+    """Since the joint states before."""
 
     @classmethod
     def of(cls, message: JointState, joints: tuple[str, ...], before: Seen | None) -> Seen | None:

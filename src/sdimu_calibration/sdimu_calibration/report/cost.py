@@ -24,23 +24,16 @@ _WHOLE_M = 10.0
 
 @dataclass(frozen=True)
 class Off:
-    """A coefficient that is wrong while an effect is missing.
-
-    Attributes
-    ----------
-    amount : float
-        By how much it is too large, in `unit`.
-    sigma : float
-        Sigma of the better value, in `unit`: how well the amount is known.
-    sigmas : float
-        The amount over the sigma that it is given with.
-    """
+    """A coefficient that is wrong while an effect is missing."""
 
     name: str
     amount: float
+    """By how much it is too large, in `unit`."""
     unit: str
     sigma: float
+    """Sigma of the better value, in `unit`: how well the amount is known."""
     sigmas: float
+    """The amount over the sigma that it is given with."""
 
     @property
     def text(self) -> str:
@@ -87,25 +80,17 @@ def wrong_without(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple
 
 @dataclass(frozen=True)
 class InUse:
-    """How far a navigation without aid drifts with each compensation, over all stretches that no fit has seen.
-
-    Attributes
-    ----------
-    minutes : float
-        Length of a navigation.
-    names : tuple of str
-        Of the compensations, the worst model first.
-    distance : tuple of float
-        Root mean square of the error of position at the end of the stretches (m), one a compensation.
-    promised : float
-        What the fit of the last compensation expects of the same (m); NaN where there is none.
-    """
+    """How far a navigation without aid drifts with each compensation, over all stretches that no fit has seen."""
 
     minutes: float
+    """Length of a navigation."""
     stretches: int
     names: tuple[str, ...]
+    """Of the compensations, the worst model first."""
     distance: tuple[float, ...]
+    """Root mean square of the error of position at the end of the stretches (m), one a compensation."""
     promised: float = float("nan")
+    """What the fit of the last compensation expects of the same (m); NaN where there is none."""
 
     @property
     def figures(self) -> str:

@@ -38,24 +38,18 @@ NOTABLE = 3.0
 
 @dataclass(frozen=True)
 class Residuals:
-    """Innovations of the navigation filter with every coefficient at its estimate.
-
-    Attributes
-    ----------
-    t : ndarray, shape (e,)
-        End of each epoch (s).
-    stop : ndarray of int, shape (e,)
-    sigma : ndarray, shape (e, 12)
-        Predicted one sigma (SI); NaN where not measured.
-    before, after : ndarray, shape (e, 12)
-        In sigmas, with the model as given and with what was found added; NaN where not measured.
-    """
+    """Innovations of the navigation filter with every coefficient at its estimate."""
 
     t: Floats
+    """End of each epoch (s), shape (e,)."""
     stop: Ints
+    """Shape (e,)."""
     sigma: Floats
+    """Shape (e, 12). Predicted one sigma (SI); NaN where not measured."""
     before: Floats
     after: Floats
+    """`before`, `after`: Shape (e, 12). In sigmas, with the model as given and with what was found added; NaN where not
+    measured."""
 
 
 def added(diagnosis: Diagnosis) -> tuple[Ints, Floats]:
@@ -146,28 +140,21 @@ def stop_grid(found: Residuals, after: bool) -> Grid:
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate with its evidence, numbers in `unit` (customary).
-
-    Attributes
-    ----------
-    z, left : float
-        Score with the model as given, and with what was found added.
-    smallest, prior : float
-        Minimal detectable size, and the size that physics gives it (inf where unknown).
-    retention : float
-        Share of its signature that the model leaves.
-    """
+    """A candidate with its evidence, numbers in `unit` (customary)."""
 
     label: str
     family: str
     unit: str
     z: float
     left: float
+    """`z`, `left`: Score with the model as given, and with what was found added."""
     estimate: float
     sigma: float
     smallest: float
     prior: float
+    """`smallest`, `prior`: Minimal detectable size, and the size that physics gives it (inf where unknown)."""
     retention: float
+    """Share of its signature that the model leaves."""
     chosen: bool
 
 
@@ -218,25 +205,18 @@ def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chose
 
 @dataclass(frozen=True)
 class FreeInputs:
-    """Sensor error that every dwell and turn would need of its own (minimum norm), s segments.
-
-    Attributes
-    ----------
-    start, end : ndarray, shape (s,)
-        Seconds.
-    turn : ndarray of bool, shape (s,)
-    before, after : ndarray, shape (s, 6)
-        deg/h for the gyros, ug for the accelerometers.
-    z : ndarray, shape (s, 6)
-        Score of each alone, with the model as given.
-    """
+    """Sensor error that every dwell and turn would need of its own (minimum norm), s segments."""
 
     start: Floats
     end: Floats
+    """`start`, `end`: Seconds, shape (s,)."""
     turn: Bools
+    """Shape (s,)."""
     before: Floats
     after: Floats
+    """`before`, `after`: deg/h for the gyros, ug for the accelerometers, shape (s, 6)."""
     z: Floats
+    """Score of each alone, with the model as given, shape (s, 6)."""
 
 
 def free_inputs(diagnosis: Diagnosis) -> FreeInputs:

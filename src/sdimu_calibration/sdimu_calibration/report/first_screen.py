@@ -45,34 +45,23 @@ _WORST = 3
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """What a page says first, in HTML.
-
-    Attributes
-    ----------
-    tone : str
-        ``good``, ``doubtful`` or ``bad``.
-    head : str
-        The verdict in one sentence.
-    costs : tuple of (str, str)
-        A figure, and what it is.
-    advice : tuple of str
-        What to do next, the most useful first.
-    remarks : tuple of str
-        What a reader must know before the numbers, besides the verdict.
-    tag : str
-        The verdict in a few words; empty for those of the tone.
-    ladder : str
-        Models with their errors, above the costs.
-    """
+    """What a page says first, in HTML."""
 
     tone: str
+    """``good``, ``doubtful`` or ``bad``."""
     head: str
+    """The verdict in one sentence."""
     costs: tuple[tuple[str, str], ...] = ()
+    """A figure, and what it is."""
     advice: tuple[str, ...] = ()
+    """What to do next, the most useful first."""
     cost_title: str = _COSTS
     remarks: tuple[str, ...] = ()
+    """What a reader must know before the numbers, besides the verdict."""
     tag: str = ""
+    """The verdict in a few words; empty for those of the tone."""
     ladder: str = ""
+    """Models with their errors, above the costs."""
 
 
 def of_diagnosis(

@@ -96,25 +96,18 @@ def _heat_map(drawn: Raster, top: int, grid: Grid, channels: Sequence[str]) -> N
 
 @dataclass(frozen=True)
 class _Bars:
-    """Bars with a name before and words behind each, over an axis from zero, and a dashed line.
-
-    Attributes
-    ----------
-    top : int
-        Upper edge of the first bar (px).
-    line : float
-        Where the dashed line is; not finite leaves it out.
-    ink : tuple of int
-        Of the bars.
-    """
+    """Bars with a name before and words behind each, over an axis from zero, and a dashed line."""
 
     drawn: Raster
     top: int
+    """Upper edge of the first bar (px)."""
     values: Sequence[float]
     words: Sequence[str]
     names: Sequence[str]
     line: float
+    """Where the dashed line is; not finite leaves it out."""
     ink: Colour
+    """Of the bars."""
 
     def draw(self, caption: str) -> None:
         """Draw the panel, with a caption below its axis."""

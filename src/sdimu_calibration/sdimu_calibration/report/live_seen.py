@@ -13,43 +13,30 @@ from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 
 @dataclass
 class Progress:
-    """How far a test is.
-
-    Attributes
-    ----------
-    table_s, filter_s : float
-        Data time that table and filter have reached (s after the first status).
-    sigmas : dict of str to float
-        Sigma (SI) by coefficient, as last published.
-    first : dict of str to float
-        The first sigma published.
-    nis : dict of str to float
-        Mean squared innovation per degree of freedom at the present stop, by channel.
-    diagnosis : SeenDiagnosis
-        The newest one; of stop -1 before the first.
-    heard : bool
-        Any message has come.
-    nis_by_stop : dict of int to dict of str to float
-        As `nis`, of every stop that was heard of.
-    ladders : dict of int to tuple of (str, str)
-        Models and their errors, by the stop that the diagnosis is of.
-    choices : list of SeenChoice
-        Of a test that chooses its turns, the newest last.
-    """
+    """How far a test is."""
 
     stop: int = 0
     phase: str = "starting"
     table_s: float = 0.0
     filter_s: float = 0.0
+    """`table_s`, `filter_s`: Data time that table and filter have reached (s after the first status)."""
     sigmas: dict[str, float] = field(default_factory=dict)
+    """Sigma (SI) by coefficient, as last published."""
     first: dict[str, float] = field(default_factory=dict)
+    """The first sigma published."""
     nis: dict[str, float] = field(default_factory=dict)
+    """Mean squared innovation per degree of freedom at the present stop, by channel."""
     verdict: str = ""
     diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
+    """The newest one; of stop -1 before the first."""
     heard: bool = False
+    """Any message has come."""
     nis_by_stop: dict[int, dict[str, float]] = field(default_factory=dict)
+    """As `nis`, of every stop that was heard of."""
     ladders: dict[int, Rows] = field(default_factory=dict)
+    """Models and their errors, by the stop that the diagnosis is of."""
     choices: list[SeenChoice] = field(default_factory=list)
+    """Of a test that chooses its turns, the newest last."""
 
     @property
     def is_test(self) -> bool:
@@ -59,22 +46,15 @@ class Progress:
 
 @dataclass(frozen=True)
 class Outline:
-    """What is known of a test before it runs.
-
-    Attributes
-    ----------
-    duration_s : float
-        0 where nobody knows.
-    stops : int
-        0 where nobody knows.
-    units : mapping of str to str
-        Customary unit by coefficient.
-    """
+    """What is known of a test before it runs."""
 
     duration_s: float
+    """0 where nobody knows."""
     stops: int
+    """0 where nobody knows."""
     effects: Sequence[str]
     units: Mapping[str, str]
+    """Customary unit by coefficient."""
 
 
 def place_words(test: Outline, seen: Progress) -> str:

@@ -37,54 +37,38 @@ class SeenFamily:
 
 @dataclass(frozen=True)
 class SeenChoice:
-    """A choice of a test that chooses its turns.
-
-    Attributes
-    ----------
-    text : str
-        Move and reason, or why the test ends.
-    minutes : float
-        Of the test, when it was made.
-    worst : float
-        Largest sigma over its limit (1).
-    """
+    """A choice of a test that chooses its turns."""
 
     text: str
+    """Move and reason, or why the test ends."""
     minutes: float
+    """Of the test, when it was made."""
     worst: float
+    """Largest sigma over its limit (1)."""
 
 
 @dataclass(frozen=True)
 class SeenDiagnosis:
-    """A live diagnosis as its topics tell it.
-
-    Attributes
-    ----------
-    reaches : str
-        Size of the score that noise reaches, in words.
-    ranking, ladder : tuple of (str, str)
-        Candidates and their scores; models and their errors.
-    channels : tuple of str, length c
-    stops : tuple of str, length s
-    heat : ndarray, shape (c, s)
-        Mean innovation over its sigma.
-    nothing : float
-        Probability that no effect is missing; NaN before the test has ended.
-    families : tuple of SeenFamily
-        The likeliest first; none before the test has ended.
-    """
+    """A live diagnosis as its topics tell it."""
 
     stop: int = -1
     verdict: str = ""
     sentence: str = ""
     reaches: str = ""
+    """Size of the score that noise reaches, in words."""
     ranking: Rows = ()
     ladder: Rows = ()
+    """`ranking`, `ladder`: Candidates and their scores; models and their errors."""
     channels: tuple[str, ...] = ()
+    """Length c."""
     stops: tuple[str, ...] = ()
+    """Length s."""
     heat: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    """Mean innovation over its sigma, shape (c, s)."""
     nothing: float = math.nan
+    """Probability that no effect is missing; NaN before the test has ended."""
     families: tuple[SeenFamily, ...] = ()
+    """The likeliest first; none before the test has ended."""
 
     @property
     def line(self) -> str:

@@ -12,15 +12,10 @@ Draw = Callable[[Any], str]
 
 
 class Card(str):
-    """A section of a page as HTML, of which a table of contents asks what it is called.
-
-    Attributes
-    ----------
-    heading : str
-        As text, not as HTML.
-    """
+    """A section of a page as HTML, of which a table of contents asks what it is called."""
 
     heading: str
+    """As text, not as HTML."""
 
     def __new__(cls, html: str, heading: str) -> Card:
         """Take the HTML of a section under its heading."""

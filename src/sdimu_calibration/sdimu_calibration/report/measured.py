@@ -19,21 +19,16 @@ UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("g",) * 3
 
 @dataclass(frozen=True)
 class Overlay:
-    """Measured and predicted values of the twelve channels, one row a stop, in `UNITS`.
-
-    Attributes
-    ----------
-    t : ndarray, shape (s,)
-        Middle of each stop (s).
-    measured, predicted : ndarray, shape (s, 12)
-        NaN where not measured. Rate and specific force: what the sensors say, and what the model with everything found
-        says that they should, means over the stop. Position and velocity: what navigation with the model as given
-        says after the turn, where rest is the truth, and what the found effects make of it.
-    """
+    """Measured and predicted values of the twelve channels, one row a stop, in `UNITS`."""
 
     t: Floats
+    """Middle of each stop (s), shape (s,)."""
     measured: Floats
     predicted: Floats
+    """`measured`, `predicted`: Shape (s, 12). NaN where not measured. Rate and specific force: what the sensors say,
+    and what the model with everything found says that they should, means over the stop. Position and velocity: what
+    navigation with the model as given says after the turn, where rest is the truth, and what the found effects make of
+    it."""
 
 
 def overlay(diagnosis: Diagnosis, found: Residuals) -> Overlay:
@@ -69,24 +64,18 @@ def table_angles(table: TableLog, t: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Jumps:
-    """What navigation says in the first second after each turn about one body axis, m turns.
-
-    Attributes
-    ----------
-    axis : ndarray of int, shape (m,)
-    angle : ndarray, shape (m,)
-        Signed (deg).
-    stop : ndarray of int, shape (m,)
-        At which it ends.
-    before, after : ndarray, shape (m, 3)
-        Velocity innovation N, E, D in sigmas, with the model as given and with what was found.
-    """
+    """What navigation says in the first second after each turn about one body axis, m turns."""
 
     axis: Ints
+    """Shape (m,)."""
     angle: Floats
+    """Signed (deg), shape (m,)."""
     stop: Ints
+    """At which it ends, shape (m,)."""
     before: Floats
     after: Floats
+    """`before`, `after`: Velocity innovation N, E, D in sigmas, with the model as given and with what was found,
+    shape (m, 3)."""
 
 
 def jumps(diagnosis: Diagnosis, found: Residuals) -> Jumps:

@@ -25,21 +25,14 @@ _LEVEL = 9
 
 @dataclass(frozen=True)
 class _Font:
-    """Characters of one height.
-
-    Attributes
-    ----------
-    strip : ndarray of float, shape (h, w)
-        Coverage (0 to 1), one character beside the other.
-    edges : ndarray of int, shape (n + 1,)
-        Column at which each begins.
-    place : dict of str to int
-        Number of each character.
-    """
+    """Characters of one height."""
 
     strip: NDArray[np.float64]
+    """Coverage (0 to 1), one character beside the other, shape (h, w)."""
     edges: NDArray[np.int32]
+    """Column at which each begins, shape (n + 1,)."""
     place: dict[str, int]
+    """Number of each character."""
 
     def coverage(self, words: str) -> NDArray[np.float64]:
         """Coverage (0 to 1) of a line of text, shape (h, width)."""

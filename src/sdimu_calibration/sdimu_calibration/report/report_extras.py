@@ -14,24 +14,16 @@ from sdimu_calibration.core.results import Calibration
 
 @dataclass(frozen=True)
 class ReportExtras:
-    """Whatever is known; what is empty is left out of the page.
-
-    Attributes
-    ----------
-    table : TableLog or None
-        Axis angles: shown, never used.
-    trials : tuple of FreeInertialRun
-        Free navigations of segments that no fit has seen.
-    no_trial : str
-        Why there is none.
-    given : Calibration or None
-        What a calibration delivers with the model as given, noise with a memory learned without what is missing.
-    """
+    """Whatever is known; what is empty is left out of the page."""
 
     table: TableLog | None = None
+    """Axis angles: shown, never used."""
     trials: tuple[FreeInertialRun, ...] = ()
+    """Free navigations of segments that no fit has seen."""
     no_trial: str = ""
+    """Why there is none."""
     given: Calibration | None = None
+    """What a calibration delivers with the model as given, noise with a memory learned without what is missing."""
 
 
 def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportExtras:

@@ -27,43 +27,30 @@ LEVEL = 0.95
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Whitened innovations of a finished fit in four kinds: position, velocity, rate, force.
-
-    Attributes
-    ----------
-    bins : ndarray, shape (b,)
-        Middles of the bins of the histogram (sigma).
-    density : ndarray, shape (4, b)
-        Probability density; zero where a kind is not measured.
-    expected, found : tuple of ndarray, each shape (q,)
-        Quantiles of the normal distribution and of each kind (sigma).
-    lags : ndarray of int, shape (l,)
-        Epochs.
-    correlation : ndarray, shape (l, 6)
-        Autocorrelation of gyro x, y, z and accelerometer x, y, z within the stops (dimensionless).
-    band : float
-        What white noise stays inside with `LEVEL`.
-    t : ndarray, shape (s,)
-        Middle of each stop (min).
-    stop : ndarray of int, shape (s,)
-    nis : ndarray, shape (s, 4)
-        Mean NIS per degree of freedom at each stop; NaN where not measured.
-    low, high : ndarray, shape (s, 4)
-        Band of `nis` with `LEVEL`.
-    """
+    """Whitened innovations of a finished fit in four kinds: position, velocity, rate, force."""
 
     bins: Floats
+    """Middles of the bins of the histogram (sigma), shape (b,)."""
     density: Floats
+    """Shape (4, b). Probability density; zero where a kind is not measured."""
     expected: tuple[Floats, ...]
     found: tuple[Floats, ...]
+    """`expected`, `found`: Quantiles of the normal distribution and of each kind (sigma), each shape (q,)."""
     lags: Ints
+    """Epochs, shape (l,)."""
     correlation: Floats
+    """Autocorrelation of gyro x, y, z and accelerometer x, y, z within the stops (dimensionless), shape (l, 6)."""
     band: float
+    """What white noise stays inside with `LEVEL`."""
     t: Floats
+    """Middle of each stop (min), shape (s,)."""
     stop: Ints
+    """Shape (s,)."""
     nis: Floats
+    """Shape (s, 4). Mean NIS per degree of freedom at each stop; NaN where not measured."""
     low: Floats
     high: Floats
+    """`low`, `high`: Band of `nis` with `LEVEL`, shape (s, 4)."""
 
 
 def whiteness(fit: NavigationFit) -> Whiteness:

@@ -20,30 +20,22 @@ from sdimu_calibration.report.groups import is_free
 
 @dataclass(frozen=True)
 class Row:
-    """A coefficient, in `unit`; None where there is nothing to say.
-
-    Attributes
-    ----------
-    value, sigma : float
-        Both zero when the body frame makes the coefficient zero by definition.
-    truth, error, error_sigmas : float or None
-        True value, estimate minus truth, and that over sigma.
-    reference : float or None
-        Published sigma of its group.
-    prior : float or None
-        One sigma by the IMU's file.
-    """
+    """A coefficient, in `unit`; None where there is nothing to say."""
 
     name: str
     effect: str
     unit: str
     value: float
     sigma: float
+    """`value`, `sigma`: Both zero when the body frame makes the coefficient zero by definition."""
     truth: float | None = None
     error: float | None = None
     error_sigmas: float | None = None
+    """`truth`, `error`, `error_sigmas`: True value, estimate minus truth, and that over sigma."""
     reference: float | None = None
+    """Published sigma of its group."""
     prior: float | None = None
+    """One sigma by the IMU's file."""
 
 
 def rows(

@@ -136,41 +136,29 @@ def open_test(
 
 @dataclass(frozen=True, kw_only=True)
 class Opening:
-    """How a recording is opened: what is stated of it, read; what is left out is recognised, assumed or in the bag.
-
-    Attributes
-    ----------
-    site, imu, source, handheld, measured_noise
-        As for `open_test`.
-    whole_turns : float
-        By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none.
-    rests : tuple of (float, float)
-        By hand: begin and end of every rest (s after the first sample); without any they are found.
-    exclude_stops : tuple of int
-        Stops that no fit sees.
-    exclude_times : tuple of (float, float)
-        Spans of time (s) in which no fit takes a measurement.
-    serial, power_on : str or None
-        Of the unit, in place of what the bag says.
-    reference_degc : float or None
-        Temperature from which temperature effects count (deg C); None is that at the start of the recording.
-    imu_file : str or None
-        Name or path that `imu` was read from.
-    """
+    """How a recording is opened: what is stated of it, read; what is left out is recognised, assumed or in the bag."""
 
     site: str | None = None
     imu: ImuSpecification | None = None
     source: Source = field(default_factory=Source)
     handheld: bool | None = None
     measured_noise: bool = False
+    """`site`, `imu`, `source`, `handheld`, `measured_noise`: As for `open_test`."""
     whole_turns: float = 0.0
+    """By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none."""
     rests: tuple[tuple[float, float], ...] = ()
+    """By hand: begin and end of every rest (s after the first sample); without any they are found."""
     exclude_stops: tuple[int, ...] = ()
+    """Stops that no fit sees."""
     exclude_times: tuple[tuple[float, float], ...] = ()
+    """Spans of time (s) in which no fit takes a measurement."""
     serial: str | None = None
     power_on: str | None = None
+    """`serial`, `power_on`: Of the unit, in place of what the bag says."""
     reference_degc: float | None = None
+    """Temperature from which temperature effects count (deg C); None is that at the start of the recording."""
     imu_file: str | None = None
+    """Name or path that `imu` was read from."""
 
     def test(self, path: Path) -> PreparedTest:
         """Open a bag so."""

@@ -34,23 +34,17 @@ _KEPT_OPEN = 2
 
 @dataclass(frozen=True)
 class BagSource:
-    """Opens a bag of a set; another process can do so too.
-
-    Attributes
-    ----------
-    site, imu : str or None
-        As the options of the same names.
-    reference_degc : float or None
-        Temperature from which temperature effects count (deg C); None is that at the start of the recording.
-    """
+    """Opens a bag of a set; another process can do so too."""
 
     bag: Path
     site: str | None = None
     imu: str | None = None
+    """`site`, `imu`: As the options of the same names."""
     source: Source = field(default_factory=Source)
     handheld: bool | None = None
     measured_noise: bool = False
     reference_degc: float | None = None
+    """Temperature from which temperature effects count (deg C); None is that at the start of the recording."""
 
     def __call__(self) -> PreparedTest:
         """Open the bag."""
@@ -69,18 +63,12 @@ def _opened(of: BagSource, _: tuple[FileState, ...]) -> PreparedTest:
 
 @dataclass(frozen=True)
 class RecordingSet:
-    """A set as it is written.
-
-    Attributes
-    ----------
-    members : tuple of Member
-        Each opens a `BagSource`.
-    model : str or None
-        Name or path.
-    """
+    """A set as it is written."""
 
     members: tuple[Member, ...]
+    """Each opens a `BagSource`."""
     model: str | None = None
+    """Name or path."""
     estimator: str = "auto"
     scopes: Mapping[str, str] = field(default_factory=dict)
 

@@ -15,27 +15,18 @@ from sdimu_calibration.storage.files.file_hashes import file_hashes
 
 @dataclass(frozen=True)
 class Trace:
-    """How a result came about.
-
-    Attributes
-    ----------
-    made : str
-        When (UTC).
-    program : str
-        Name and version.
-    command : str
-        What was typed; empty from Python.
-    stated : tuple of (str, str)
-        What the user named: IMU file, site, model, plan.
-    files : tuple of (str, str)
-        Path of each file of the recordings and its SHA-256.
-    """
+    """How a result came about."""
 
     made: str
+    """When (UTC)."""
     program: str
+    """Name and version."""
     command: str = ""
+    """What was typed; empty from Python."""
     stated: tuple[tuple[str, str], ...] = ()
+    """What the user named: IMU file, site, model, plan."""
     files: tuple[tuple[str, str], ...] = ()
+    """Path of each file of the recordings and its SHA-256."""
 
 
 def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: str | Path | None) -> Trace:

@@ -37,45 +37,31 @@ _MOST_RESTS = 10_000
 
 @dataclass(frozen=True)
 class ByHand:
-    """A handheld run.
-
-    Attributes
-    ----------
-    rests : int
-        Random attitudes, uniform over all.
-    imu, site : ImuSpecification, Site
-        The site makes the truth; no estimator knows it.
-    seed : int
-        Of everything random: attitudes, times, sway, coefficients, noise.
-    rest_s, turn_s : tuple of float
-        Shortest and longest rest and turn.
-    lever_arm_m : tuple of float
-        Accelerometers from the wrist, in b: their force in a turn is not gravity's alone.
-    effects : tuple of str
-        Hidden effects, canonical keys with sizes.
-    noise : tuple of str
-        Noise with a memory, as of `Scenario`.
-    nudges : float
-        Share of the rests in which somebody nudges the IMU: it wobbles for a moment and comes back.
-    trembling : int
-        Number of rests in which the hand holds the IMU and trembles.
-    tremble : tuple of float
-        Least and largest scatter (1 sigma) of a trembling rest, as a multiple of that of a quiet one.
-    """
+    """A handheld run."""
 
     rests: int
+    """Random attitudes, uniform over all."""
     imu: ImuSpecification
     site: Site
+    """`imu`, `site`: The site makes the truth; no estimator knows it."""
     seed: int = 1
+    """Of everything random: attitudes, times, sway, coefficients, noise."""
     rate_hz: float = 100.0
     rest_s: tuple[float, float] = (1.5, 5.0)
     turn_s: tuple[float, float] = (0.8, 2.5)
+    """`rest_s`, `turn_s`: Shortest and longest rest and turn."""
     lever_arm_m: tuple[float, float, float] = (0.12, -0.05, 0.2)
+    """Accelerometers from the wrist, in b: their force in a turn is not gravity's alone."""
     effects: tuple[str, ...] = ()
+    """Hidden effects, canonical keys with sizes."""
     noise: tuple[str, ...] = ()
+    """Noise with a memory, as of `Scenario`."""
     nudges: float = 0.0
+    """Share of the rests in which somebody nudges the IMU: it wobbles for a moment and comes back."""
     trembling: int = 0
+    """Number of rests in which the hand holds the IMU and trembles."""
     tremble: tuple[float, float] = (2.0, 6.0)
+    """Least and largest scatter (1 sigma) of a trembling rest, as a multiple of that of a quiet one."""
 
     def with_effects(self, *effects: str) -> ByHand:
         """Return the same run by a hand that holds an IMU with these hidden effects."""

@@ -41,17 +41,12 @@ _AROUND = 20
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula that has been checked.
-
-    Attributes
-    ----------
-    names : frozenset of str
-        Variables it reads.
-    """
+    """A formula that has been checked."""
 
     text: str
     tree: ast.expr
     names: frozenset[str]
+    """Variables it reads."""
 
     def evaluate(self, values: Mapping[str, Floats | float]) -> Any:
         """Value for given variables, elementwise; a number when no array is in it."""

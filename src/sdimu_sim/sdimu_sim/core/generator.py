@@ -87,22 +87,15 @@ _BLOCK = 20_000
 
 @dataclass(frozen=True)
 class ImuSamples:
-    """Readings of the IMU.
-
-    Attributes
-    ----------
-    ns : ndarray of int64, shape (m,)
-        Stamps: ends of the sample intervals (ns from the start).
-    t : ndarray, shape (m,)
-        The same in s.
-    omega_ib_b, f_ib_b : ndarray, shape (m, 3)
-        rad/s, m/s^2, as measured.
-    """
+    """Readings of the IMU."""
 
     ns: Ints
+    """Shape (m,). Stamps: ends of the sample intervals (ns from the start)."""
     t: Floats
+    """The same in s, shape (m,)."""
     omega_ib_b: Floats
     f_ib_b: Floats
+    """`omega_ib_b`, `f_ib_b`: rad/s, m/s^2, as measured, shape (m, 3)."""
 
 
 class ImuGenerator:

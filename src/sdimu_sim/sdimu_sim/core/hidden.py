@@ -201,25 +201,17 @@ _SITE = {
 
 @dataclass(frozen=True)
 class Term:
-    """Something added to one sensor's output.
-
-    Attributes
-    ----------
-    sensor : int
-        Index in `SENSORS`.
-    expression : Expression
-        rad/s or m/s^2.
-    parameters : mapping of str to float
-        k and others, SI; constants for the expression.
-    memory : tuple of str
-        What `y` is in the expression, as in `Row`; empty where it remembers nothing.
-    """
+    """Something added to one sensor's output."""
 
     name: str
     sensor: int
+    """Index in `SENSORS`."""
     expression: Expression
+    """rad/s or m/s^2."""
     parameters: dict[str, float]
+    """k and others, SI; constants for the expression."""
     memory: tuple[str, ...] = ()
+    """What `y` is in the expression, as in `Row`; empty where it remembers nothing."""
 
 
 class Lost(NamedTuple):
@@ -243,27 +235,19 @@ class SiteError(NamedTuple):
 
 @dataclass(frozen=True)
 class Hidden:
-    """All hidden effects of a test.
-
-    Attributes
-    ----------
-    delay_s : tuple of float
-        Of each of the six sensors (>= 0).
-    lever_arm_m : mapping of int to float
-        Components of the lever arm that are given.
-    coefficients : mapping of str to float
-        Of the baseline (SI), as built.
-    sizes : mapping of str to float
-        Size (SI) of every effect but the coefficients of the baseline, by the name that its estimate has.
-    """
+    """All hidden effects of a test."""
 
     terms: tuple[Term, ...] = ()
     delay_s: tuple[float, ...] = (0.0,) * 6
+    """Of each of the six sensors (>= 0)."""
     lost: tuple[Lost, ...] = ()
     site: SiteError = field(default_factory=SiteError)
     lever_arm_m: Mapping[int, float] = field(default_factory=dict)
+    """Components of the lever arm that are given."""
     coefficients: Mapping[str, float] = field(default_factory=dict)
+    """Of the baseline (SI), as built."""
     sizes: Mapping[str, float] = field(default_factory=dict)
+    """Size (SI) of every effect but the coefficients of the baseline, by the name that its estimate has."""
 
     @property
     def reads(self) -> frozenset[str]:

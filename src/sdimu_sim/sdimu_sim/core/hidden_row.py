@@ -12,31 +12,22 @@ _XYZ = "xyz"
 
 @dataclass(frozen=True)
 class Row:
-    """Family of effects.
-
-    Attributes
-    ----------
-    names : str
-        Coefficients, ``gyro_...`` or ``accel_...``, with index letters.
-    unit : str
-        Of the size k.
-    formula : str or mapping of str to str
-        rad/s or m/s^2, in `sdimu_sim.core.hidden.VARIABLES`, k and the options (SI); by sensor where it
-        is not that of the name alone.
-    options : mapping of str to str
-        Unit of each option.
-    drawn : bool
-        The campaign on hidden effects draws it; what came later is left out, so that a seed draws what it drew before.
-    memory : tuple of str
-        What `y` is in the formula: kind of `sdimu_sim.core.memory`, variable that is remembered, option that it has.
-    """
+    """Family of effects."""
 
     names: str
+    """Coefficients, ``gyro_...`` or ``accel_...``, with index letters."""
     unit: str
+    """Of the size k."""
     formula: str | Mapping[str, str]
+    """rad/s or m/s^2, in `sdimu_sim.core.hidden.VARIABLES`, k and the options (SI); by sensor where it is not that of
+    the name alone."""
     options: Mapping[str, str] = field(default_factory=dict)
+    """Unit of each option."""
     drawn: bool = True
+    """The campaign on hidden effects draws it; what came later is left out, so that a seed draws what it drew before.
+    """
     memory: tuple[str, ...] = ()
+    """What `y` is in the formula: kind of `sdimu_sim.core.memory`, variable that is remembered, option that it has."""
 
 
 class Part(NamedTuple):

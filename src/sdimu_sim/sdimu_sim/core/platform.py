@@ -17,21 +17,14 @@ QUANTITIES = 24
 
 @dataclass(frozen=True)
 class PlatformMotion:
-    """Orientation and rate of the platform t against NED at ascending times.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Seconds.
-    q_nt : ndarray, shape (n, 4)
-        Scalar first.
-    omega_nt_t : ndarray, shape (n, 3)
-        rad/s, resolved in t.
-    """
+    """Orientation and rate of the platform t against NED at ascending times."""
 
     t: Floats
+    """Seconds, shape (n,)."""
     q_nt: Floats
+    """Scalar first, shape (n, 4)."""
     omega_nt_t: Floats
+    """rad/s, resolved in t, shape (n, 3)."""
 
 
 @compiled

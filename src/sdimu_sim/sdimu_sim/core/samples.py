@@ -58,25 +58,18 @@ class SampleClock:
 
 @dataclass(frozen=True)
 class TrueSamples:
-    """True means over m sample intervals, resolved in b; every array (3, m) and contiguous by row.
-
-    Attributes
-    ----------
-    omega_ib, f_ib, omega_nb, alpha, field : ndarray, shape (3, m)
-        rad/s, m/s^2, rad/s, rad/s^2, T.
-    down : ndarray, shape (3, m)
-        Down component of each body axis.
-    lever : ndarray, shape (3, 3, m)
-        Mean of ``[alpha x] + [omega x]^2`` (1/s^2).
-    """
+    """True means over m sample intervals, resolved in b; every array (3, m) and contiguous by row."""
 
     omega_ib: Floats
     f_ib: Floats
     omega_nb: Floats
     alpha: Floats
     field: Floats
+    """`omega_ib`, `f_ib`, `omega_nb`, `alpha`, `field`: rad/s, m/s^2, rad/s, rad/s^2, T, shape (3, m)."""
     down: Floats
+    """Down component of each body axis, shape (3, m)."""
     lever: Floats
+    """Mean of ``[alpha x] + [omega x]^2`` (1/s^2), shape (3, 3, m)."""
 
 
 def in_body(means: Floats, C_tb: Floats, gravity: float, lever_arm: Floats) -> TrueSamples:

@@ -25,48 +25,35 @@ TABLE_LOG_HZ = 10.0
 
 @dataclass(frozen=True)
 class Scenario:
-    """What is simulated.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Of the IMU, 10 to 1000.
-    seed : int
-        Of everything random: coefficients, mount, noise, encoders.
-    mount_rad : tuple of float or None
-        Rotation vector of the IMU on the platform; None draws it up to `mount_max_rad` about every axis.
-    effects : tuple of str
-        Hidden effects, canonical keys with sizes.
-    noise : tuple of str
-        Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`).
-    coefficients : mapping of str to float or None
-        As built, SI; None draws them from the IMU's specification.
-    unit : int or None
-        Seed of the coefficients in place of `seed`: scenarios of one unit have the same.
-    turn_on : mapping of str to float
-        By group of coefficients, such as ``gyro_bias``, the sigma (SI) by which each of them differs in this power-on.
-    extras : mapping
-        Other attributes of `ImuTruth` (lever arm, quantisation ...).
-    start_ns : int
-        Stamp of the start.
-    """
+    """What is simulated."""
 
     plan: Plan
     imu: ImuSpecification
     site: Site
     table: TableSpecification = field(default_factory=TableSpecification)
     rate_hz: float = 100.0
+    """Of the IMU, 10 to 1000."""
     seed: int = 1
+    """Of everything random: coefficients, mount, noise, encoders."""
     mount_rad: tuple[float, float, float] | None = None
+    """Rotation vector of the IMU on the platform; None draws it up to `mount_max_rad` about every axis."""
     mount_max_rad: float = float(np.radians(3.0))
     effects: tuple[str, ...] = ()
+    """Hidden effects, canonical keys with sizes."""
     noise: tuple[str, ...] = ()
+    """Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`)."""
     temperature: TemperatureProfile | None = None
     coefficients: Mapping[str, float] | None = None
+    """As built, SI; None draws them from the IMU's specification."""
     unit: int | None = None
+    """Seed of the coefficients in place of `seed`: scenarios of one unit have the same."""
     turn_on: Mapping[str, float] = field(default_factory=dict)
+    """By group of coefficients, such as ``gyro_bias``, the sigma (SI) by which each of them differs in this power-on.
+    """
     extras: Mapping[str, object] = field(default_factory=dict)
+    """Other attributes of `ImuTruth` (lever arm, quantisation ...)."""
     start_ns: int = DEFAULT_START_NS
+    """Stamp of the start."""
 
     @property
     def reference_degc(self) -> float | None:

@@ -16,37 +16,28 @@ class TemperatureProfile:
 
     The sensors follow the thermometer with a first-order lag, ``lag dTs/dt = T - Ts``; at t = 0 both have the same
     temperature.
-
-    Attributes
-    ----------
-    start_degc : float
-        Of the chamber at t = 0 (deg C).
-    rise, tau_s : float
-        Self-heating (K) and its time constant (s).
-    ripple, ripple_period_s : float
-        Of the air conditioning (K, s).
-    knots : tuple of (float, float)
-        Times (s, ascending, from 0) and temperatures (deg C) between which the chamber goes straight; constant after
-        the last. Empty: constant at `start_degc`.
-    reference_degc : float or None
-        Temperature T0 for which the coefficients are stated (deg C); None: that at t = 0.
-    sensor_lag_s : float
-        Lag of the sensors behind the thermometer (s).
-    offset, noise, resolution : float
-        Of the thermometer: error (K), white noise of a reading (K, one sigma), step of its output (K; 0 for none).
     """
 
     start_degc: float = 25.0
+    """Of the chamber at t = 0 (deg C)."""
     rise: float = 0.0
     tau_s: float = 1200.0
+    """`rise`, `tau_s`: Self-heating (K) and its time constant (s)."""
     ripple: float = 0.0
     ripple_period_s: float = 600.0
+    """`ripple`, `ripple_period_s`: Of the air conditioning (K, s)."""
     knots: tuple[tuple[float, float], ...] = ()
+    """Times (s, ascending, from 0) and temperatures (deg C) between which the chamber goes straight; constant after the
+    last. Empty: constant at `start_degc`."""
     reference_degc: float | None = None
+    """Temperature T0 for which the coefficients are stated (deg C); None: that at t = 0."""
     sensor_lag_s: float = 0.0
+    """Lag of the sensors behind the thermometer (s)."""
     offset: float = 0.0
     noise: float = 0.0
     resolution: float = 0.0
+    """`offset`, `noise`, `resolution`: Of the thermometer: error (K), white noise of a reading (K, one sigma), step of
+    its output (K; 0 for none)."""
 
     @property
     def origin_degc(self) -> float:

@@ -43,44 +43,31 @@ DEFAULT_MAGNETIC_FIELD = (30.0e-6, -4.5e-6, 40.0e-6)
 
 @dataclass(frozen=True)
 class ImuTruth:
-    """Everything that makes the IMU's output differ from the world.
-
-    Attributes
-    ----------
-    coefficients : mapping of str to float
-        As built, SI, by fixed name; a name left out is zero. A misalignment is an angle by which an input axis was
-        turned; a scale is a relative change of length of that axis.
-    mount_rad : tuple of float
-        Rotation vector of the IMU on the platform: ``C_tb = rotation_matrix(mount)``.
-    gyro_white_noise, accel_white_noise : float
-        Densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-    effects : tuple of str
-        Hidden effects, canonical keys with sizes (`sdimu_sim.core.hidden`); those that name a coefficient or the lever
-        arm are in `coefficients` and `lever_arm_m` already.
-    noise : tuple of str
-        Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`).
-    lever_arm_m : tuple of float
-        Of the accelerometers from the point that stands still, in b.
-    magnetic_field : tuple of float
-        North, East, Down.
-    gyro_step_rad, accel_step_m_s : float
-        Quantum of the angle and velocity increments; 0 for none.
-    gyro_limit_rad_s, accel_limit_m_s2 : float
-        Output saturates at this size.
-    """
+    """Everything that makes the IMU's output differ from the world."""
 
     coefficients: Mapping[str, float] = field(default_factory=dict)
+    """As built, SI, by fixed name; a name left out is zero. A misalignment is an angle by which an input axis was
+    turned; a scale is a relative change of length of that axis."""
     mount_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Rotation vector of the IMU on the platform: ``C_tb = rotation_matrix(mount)``."""
     gyro_white_noise: float = 0.0
     accel_white_noise: float = 0.0
+    """`gyro_white_noise`, `accel_white_noise`: Densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     effects: tuple[str, ...] = ()
+    """Hidden effects, canonical keys with sizes (`sdimu_sim.core.hidden`); those that name a coefficient or the lever
+    arm are in `coefficients` and `lever_arm_m` already."""
     noise: tuple[str, ...] = ()
+    """Noise with a memory, keys with sizes (`sdimu_sim.core.coloured`)."""
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the accelerometers from the point that stands still, in b."""
     magnetic_field: tuple[float, float, float] = DEFAULT_MAGNETIC_FIELD
+    """North, East, Down."""
     gyro_step_rad: float = 0.0
     accel_step_m_s: float = 0.0
+    """`gyro_step_rad`, `accel_step_m_s`: Quantum of the angle and velocity increments; 0 for none."""
     gyro_limit_rad_s: float = np.inf
     accel_limit_m_s2: float = np.inf
+    """`gyro_limit_rad_s`, `accel_limit_m_s2`: Output saturates at this size."""
 
     def __post_init__(self) -> None:
         """Refuse coefficient names that nothing would read."""

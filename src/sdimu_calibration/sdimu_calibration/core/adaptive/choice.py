@@ -27,34 +27,23 @@ _WORDS_NAT = 0.1
 
 @dataclass(frozen=True)
 class Choice:
-    """What to do next.
-
-    Attributes
-    ----------
-    step : Step
-        Turn and stop, for the table.
-    gain : float
-        What it brings (nat).
-    reason : str
-        What it brings, in words.
-    after : SoFar
-        Where the test will then be, by the covariance alone.
-    ratio : ndarray, shape (c,)
-        Sigma of every coefficient with a limit over that limit, after it (1).
-    told : float
-        Part of the gain that tells a class apart (nat).
-    done : bool
-        Nothing will be lacking after it.
-    """
+    """What to do next."""
 
     step: Step
+    """Turn and stop, for the table."""
     minutes: float
     gain: float
+    """What it brings (nat)."""
     reason: str
+    """What it brings, in words."""
     after: SoFar
+    """Where the test will then be, by the covariance alone."""
     ratio: Floats
+    """Sigma of every coefficient with a limit over that limit, after it (1), shape (c,)."""
     told: float
+    """Part of the gain that tells a class apart (nat)."""
     done: bool
+    """Nothing will be lacking after it."""
 
     @property
     def text(self) -> str:
@@ -64,16 +53,11 @@ class Choice:
 
 @dataclass(frozen=True)
 class End:
-    """The end of a test, and why.
-
-    Attributes
-    ----------
-    reached : bool
-        All limits hold, and no class is open.
-    """
+    """The end of a test, and why."""
 
     reason: str
     reached: bool
+    """All limits hold, and no class is open."""
 
 
 def choose(

@@ -15,26 +15,18 @@ from sdimu_calibration.core.recording import DataError
 
 @dataclass(frozen=True)
 class Goals:
-    """Limits of a test.
-
-    Attributes
-    ----------
-    limits : mapping of str to float
-        Largest sigma allowed, by effect (SI).
-    minutes : float
-        Time there is (min).
-    both_senses : bool
-        A limit of a gyro's scale factor holds only where an asymmetry that the test has not shown, of the size that
-        physics gives it, cannot hide more: turns about each axis in both senses.
-    tell : tuple of str
-        Coefficients or effects: the first is to be told from the others, each of the size that physics gives it.
-    """
+    """Limits of a test."""
 
     name: str
     limits: Mapping[str, float]
+    """Largest sigma allowed, by effect (SI)."""
     minutes: float
+    """Time there is (min)."""
     both_senses: bool = True
+    """A limit of a gyro's scale factor holds only where an asymmetry that the test has not shown, of the size that
+    physics gives it, cannot hide more: turns about each axis in both senses."""
     tell: tuple[str, ...] = ()
+    """Coefficients or effects: the first is to be told from the others, each of the size that physics gives it."""
 
     def of(self, names: Sequence[str], frame: str) -> tuple[Bools, Floats]:
         """Find the coefficients that have a limit.

@@ -37,29 +37,20 @@ CLEAR = 2.0
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a test knows at a stop.
-
-    Attributes
-    ----------
-    limited : tuple of str, length c
-        Coefficients with a limit.
-    ratio : ndarray, shape (c,)
-        Sigma of every coefficient with a limit over that limit, in the noise of the fit (1); with what asymmetries may
-        hide where the goals ask for both senses.
-    noise : ndarray, shape (c,)
-        Sigma in the noise of the fit over that in white noise (1).
-    open : OpenClass or None
-        The class to be told apart, by the data or else by the goals; None where none is open.
-    named : tuple of str
-        Labels of everything that was found.
-    """
+    """What a test knows at a stop."""
 
     at: SoFar
     limited: tuple[str, ...]
+    """Coefficients with a limit, length c."""
     ratio: Floats
+    """Shape (c,). Sigma of every coefficient with a limit over that limit, in the noise of the fit (1); with what
+    asymmetries may hide where the goals ask for both senses."""
     noise: Floats
+    """Sigma in the noise of the fit over that in white noise (1), shape (c,)."""
     open: OpenClass | None
+    """The class to be told apart, by the data or else by the goals; None where none is open."""
     named: tuple[str, ...]
+    """Labels of everything that was found."""
     verdict: Verdict
 
     @property

@@ -27,18 +27,13 @@ _LEADING_RAD = (math.pi / 2.0, -math.pi / 2.0)
 
 @dataclass(frozen=True)
 class Stand:
-    """Where a test stands, and what it asks of a move; see `choice.choose`.
-
-    Attributes
-    ----------
-    at : SoFar
-        Where moves since the last look have brought the test.
-    """
+    """Where a test stands, and what it asks of a move; see `choice.choose`."""
 
     known: Knowledge
     goals: Goals
     menu: Menu
     at: SoFar
+    """Where moves since the last look have brought the test."""
     minutes_left: float
     possible: Callable[..., bool]
 
@@ -54,30 +49,21 @@ class Stand:
 
 @dataclass(frozen=True)
 class Move:
-    """A turn with a stop.
-
-    Attributes
-    ----------
-    first : Turn or None
-        Turn with the shortest stop that leads there; None where the move is one by itself.
-    row : int
-        Of `worth`: the end of the stop.
-    rate : float
-        What it brings (nat/min), the turn that leads there counted.
-    elapsed_s, dwell_s : float
-        All that it takes, and its last stop (s).
-    done : bool
-        Nothing is lacking after it.
-    """
+    """A turn with a stop."""
 
     first: Turn | None
+    """Turn with the shortest stop that leads there; None where the move is one by itself."""
     turn: Turn | None
     row: int
+    """Of `worth`: the end of the stop."""
     rate: float
+    """What it brings (nat/min), the turn that leads there counted."""
     elapsed_s: float
     dwell_s: float
+    """`elapsed_s`, `dwell_s`: All that it takes, and its last stop (s)."""
     worth: Worth
     done: bool
+    """Nothing is lacking after it."""
 
 
 def needed_of(known: Knowledge) -> Floats:

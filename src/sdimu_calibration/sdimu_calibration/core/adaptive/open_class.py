@@ -11,27 +11,18 @@ from sdimu_calibration.core.arrays import Floats
 
 @dataclass(frozen=True)
 class OpenClass:
-    """An effect that was found, and those that the data cannot tell from it.
-
-    Attributes
-    ----------
-    found : str
-        Label.
-    alike : tuple of str, length k
-        Labels; the nearest first.
-    columns : tuple of int, length k + 1
-        Parameters of `SoFar`: that of `found`, then those of `alike`.
-    size : ndarray, shape (k + 1,)
-        Estimate of each by itself (SI).
-    needed : ndarray, shape (k,)
-        Difference of log Bayes factors (1) that is lacking before `found` is told from each.
-    """
+    """An effect that was found, and those that the data cannot tell from it."""
 
     found: str
+    """Label."""
     alike: tuple[str, ...]
+    """Length k. Labels; the nearest first."""
     columns: tuple[int, ...]
+    """Length k + 1. Parameters of `SoFar`: that of `found`, then those of `alike`."""
     size: Floats
+    """Estimate of each by itself (SI), shape (k + 1,)."""
     needed: Floats
+    """Difference of log Bayes factors (1) that is lacking before `found` is told from each, shape (k,)."""
 
 
 def separation(one: OpenClass, prior: Floats, covariance: Floats) -> Floats:

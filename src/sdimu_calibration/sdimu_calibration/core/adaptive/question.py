@@ -24,57 +24,38 @@ from sdimu_calibration.core.verdict import Verdict
 
 @dataclass(frozen=True)
 class Situation:
-    """Where a running test stands, and what it may do next.
-
-    Attributes
-    ----------
-    goals : Goals
-        When the test may end.
-    menu : Menu
-        Moves that it may choose from.
-    angles : tuple of float
-        Of the joints of the table (rad).
-    elapsed_s : float
-        Since the test began (s): what was recorded before does not count.
-    """
+    """Where a running test stands, and what it may do next."""
 
     goals: Goals
+    """When the test may end."""
     menu: Menu
+    """Moves that it may choose from."""
     table: RateTable
     angles: tuple[float, ...]
+    """Of the joints of the table (rad)."""
     elapsed_s: float
+    """Since the test began (s): what was recorded before does not count."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What to do next, and what it was decided by.
-
-    Attributes
-    ----------
-    step : Step or None
-        None ends the test.
-    text : str
-        Move and reason, or the reason of the end.
-    reason : str
-        The reason alone.
-    reached : bool
-        The test ends with all limits held and no class open.
-    until_s : float
-        Since the test began (s).
-    worst : float
-        Largest sigma over its limit (1).
-    named, alike : tuple of str
-        Effects that were found, and what the first open class holds besides.
-    """
+    """What to do next, and what it was decided by."""
 
     step: Step | None
+    """None ends the test."""
     text: str
+    """Move and reason, or the reason of the end."""
     reason: str
+    """The reason alone."""
     reached: bool
+    """The test ends with all limits held and no class open."""
     until_s: float
+    """Since the test began (s)."""
     worst: float
+    """Largest sigma over its limit (1)."""
     named: tuple[str, ...]
     alike: tuple[str, ...]
+    """`named`, `alike`: Effects that were found, and what the first open class holds besides."""
 
 
 def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:

@@ -38,29 +38,20 @@ _NEVER_RAD_S2 = 1.0
 
 @dataclass(frozen=True)
 class SoFar:
-    """A test at its last stop.
-
-    Attributes
-    ----------
-    setup : TestSetup
-        Its sensor model has p parameters: those of the fit, then candidates that the data leave open, then what may
-        hide.
-    state : PassState
-        Of the filter at the last epoch.
-    temperature : TemperatureLog or None
-        It stays as it was last.
-    first : ndarray, shape (3, 3)
-        Attitude at the first stop, b to n (dimensionless).
-    own : int
-        How many of the parameters are those of the fit.
-    """
+    """A test at its last stop."""
 
     setup: TestSetup
+    """Its sensor model has p parameters: those of the fit, then candidates that the data leave open, then what may
+    hide."""
     state: PassState
+    """Of the filter at the last epoch."""
     seen: Motion
     temperature: TemperatureLog | None
+    """It stays as it was last."""
     first: Floats
+    """Attitude at the first stop, b to n (dimensionless), shape (3, 3)."""
     own: int
+    """How many of the parameters are those of the fit."""
 
     @property
     def square(self) -> bool:
@@ -80,24 +71,16 @@ class SoFar:
 
 @dataclass(frozen=True)
 class Ahead:
-    """What a move would bring, by the length of the stop after it.
-
-    Attributes
-    ----------
-    elapsed_s : ndarray, shape (k,)
-        From the start of the turn to the end of each epoch of the stop (s).
-    dwell_s : ndarray, shape (k,)
-        The part of it that the stop takes (s).
-    covariance : ndarray, shape (k, p, p)
-        Of the parameters (SI).
-    end : SoFar
-        After the longest stop.
-    """
+    """What a move would bring, by the length of the stop after it."""
 
     elapsed_s: Floats
+    """From the start of the turn to the end of each epoch of the stop (s), shape (k,)."""
     dwell_s: Floats
+    """The part of it that the stop takes (s), shape (k,)."""
     covariance: Floats
+    """Of the parameters (SI), shape (k, p, p)."""
     end: SoFar
+    """After the longest stop."""
 
 
 def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, hiding: Sequence[Effect] = ()) -> SoFar:

@@ -23,21 +23,14 @@ from sdimu_calibration.core.arrays import Bools, Floats
 
 @dataclass(frozen=True)
 class Worth:
-    """What is lacking after each of k covariances.
-
-    Attributes
-    ----------
-    ratio : ndarray, shape (k, c)
-        Sigma over limit.
-    apart : ndarray, shape (k, a)
-        Difference of log Bayes factors that was added between the members of the open class (1).
-    lacking : ndarray, shape (k,)
-        To all limits and to telling the class apart (nat).
-    """
+    """What is lacking after each of k covariances."""
 
     ratio: Floats
+    """Sigma over limit, shape (k, c)."""
     apart: Floats
+    """Difference of log Bayes factors that was added between the members of the open class (1), shape (k, a)."""
     lacking: Floats
+    """To all limits and to telling the class apart (nat), shape (k,)."""
 
     def reached(self, needed: Floats) -> Bools:
         """Say which covariances leave nothing lacking.

@@ -58,38 +58,27 @@ _MOST_STEPS = 80
 
 @dataclass(frozen=True)
 class Compensator:
-    """A result made ready for samples.
-
-    Attributes
-    ----------
-    model : ImuModel
-        Of the effects that can be compensated in samples.
-    coefficients, covariance : ndarray, shape (p,) and (p, p)
-        SI, in `body_frame`.
-    inverse : ndarray, shape (6, 6)
-        ``inv(A)`` of the module's equation; rates first.
-    noise : ndarray, shape (6,)
-        White-noise power of each channel (SI^2/Hz).
-    residue : ndarray, shape (6,)
-        Variance that quantisation adds to the integral of a sample (SI^2 s^2): twice the square of the residue.
-    left_out : tuple of str
-        Effects that are not compensated, each with its reason.
-    start_temperature : float or None
-        Temperature from which the coefficients count (deg C); None where none of them depends on it.
-    temperature_range : (float, float) or None
-        Lowest and highest temperature of the calibration (deg C); None where nothing depends on it, or nobody said.
-    """
+    """A result made ready for samples."""
 
     model: ImuModel
+    """Of the effects that can be compensated in samples."""
     coefficients: Floats
     covariance: Floats
+    """`coefficients`, `covariance`: SI, in `body_frame`, shape (p,) and (p, p)."""
     inverse: Floats
+    """Shape (6, 6). ``inv(A)`` of the module's equation; rates first."""
     noise: Floats
+    """White-noise power of each channel (SI^2/Hz), shape (6,)."""
     residue: Floats
+    """Shape (6,). Variance that quantisation adds to the integral of a sample (SI^2 s^2): twice the square of the
+    residue."""
     body_frame: str
     left_out: tuple[str, ...]
+    """Effects that are not compensated, each with its reason."""
     start_temperature: float | None = None
+    """Temperature from which the coefficients count (deg C); None where none of them depends on it."""
     temperature_range: tuple[float, float] | None = None
+    """Lowest and highest temperature of the calibration (deg C); None where nothing depends on it, or nobody said."""
 
     def beyond(self, degc: Floats) -> str:
         """Say that temperatures are far from those of the calibration, where polynomials are a guess; else nothing.
@@ -112,20 +101,14 @@ class Compensator:
 
 @dataclass(frozen=True)
 class Compensated:
-    """Compensated samples, in the body frame of the coefficients.
-
-    Attributes
-    ----------
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        rad/s, m/s^2.
-    omega_covariance, f_covariance : ndarray, shape (n, 3, 3)
-        Of one sample: coefficients and white noise.
-    """
+    """Compensated samples, in the body frame of the coefficients."""
 
     omega_ib_b: Floats
     f_ib_b: Floats
+    """`omega_ib_b`, `f_ib_b`: rad/s, m/s^2, shape (n, 3)."""
     omega_covariance: Floats
     f_covariance: Floats
+    """`omega_covariance`, `f_covariance`: Shape (n, 3, 3). Of one sample: coefficients and white noise."""
 
 
 def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effect, ...]:

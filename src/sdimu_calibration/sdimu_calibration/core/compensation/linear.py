@@ -34,17 +34,12 @@ _FACTORS = (_CONSTANT, Factor(1, 0), Factor(2, 0), Factor(3, 0), Factor(0, 1), F
 
 @dataclass(frozen=True)
 class Part:
-    """Part of the sensors that is multiplied by one factor; rates first.
-
-    Attributes
-    ----------
-    matrix : ndarray, shape (6, 6)
-    bias : ndarray, shape (6,)
-        rad/s, m/s^2, per unit of the factor.
-    """
+    """Part of the sensors that is multiplied by one factor; rates first."""
 
     matrix: Floats
+    """Shape (6, 6)."""
     bias: Floats
+    """rad/s, m/s^2, per unit of the factor, shape (6,)."""
 
     @property
     def gyro(self) -> Floats:
@@ -79,24 +74,17 @@ class LinearModel(Part):
     ``rate measured = gyro w + by_force f + gyro_bias``, ``force measured = accel f + accel_bias``, with the body rate w
     and the specific force f in `body_frame`. `gyro` and `accel` are ``I + scale + misalignment``, `by_force` mass
     unbalance and g-sensitivity. All this at T0; each of `parts` adds to it, times its factor.
-
-    Attributes
-    ----------
-    left : tuple of str
-        Coefficients of effects that are not affine.
-    parts : mapping of Factor to Part
-        What follows the temperature and its rate; empty where nothing does.
-    of_temperature : tuple of str
-        Effects that are in `parts`.
-    temperature_degc : float or None
-        T0 (deg C); None where the result does not say it.
     """
 
     body_frame: str
     left: tuple[str, ...]
+    """Coefficients of effects that are not affine."""
     parts: Mapping[Factor, Part]
+    """What follows the temperature and its rate; empty where nothing does."""
     of_temperature: tuple[str, ...]
+    """Effects that are in `parts`."""
     temperature_degc: float | None
+    """T0 (deg C); None where the result does not say it."""
 
     def at(self, degc: float) -> LinearModel:
         """State the same sensors from another temperature: ``(x + step)^n`` in powers of x.

@@ -37,19 +37,13 @@ test."""
 
 @dataclass(frozen=True)
 class AccelerometerFrameModel:
-    """A model in the accelerometers' frame, and how its parameters lie in the model asked for.
-
-    Attributes
-    ----------
-    asked, inner : ImuModel
-        With p and q parameters.
-    place : ndarray of int, shape (p,)
-        Place of each parameter asked for among the inner ones; -1 for what is zero by definition.
-    """
+    """A model in the accelerometers' frame, and how its parameters lie in the model asked for."""
 
     asked: ImuModel
     inner: ImuModel
+    """`asked`, `inner`: With p and q parameters."""
     place: Ints
+    """Shape (p,). Place of each parameter asked for among the inner ones; -1 for what is zero by definition."""
 
     def values(self, inner: Floats) -> Floats:
         """Read the parameters asked for out of the inner ones.

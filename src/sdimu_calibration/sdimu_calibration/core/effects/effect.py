@@ -51,37 +51,24 @@ class Excitation(Enum):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A coefficient.
-
-    Attributes
-    ----------
-    name : str
-        The one name it has in config, state, result, report and truth.
-    unit : str
-        SI unit, as it stands in files.
-    display_unit : str
-        Customary unit, wherever a person reads.
-    """
+    """A coefficient."""
 
     name: str
+    """The one name it has in config, state, result, report and truth."""
     unit: str
+    """SI unit, as it stands in files."""
     display_unit: str
+    """Customary unit, wherever a person reads."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """Where one regressor column acts.
-
-    Attributes
-    ----------
-    channel : int
-        Sensor axis that it changes: 0-2 gyro x, y, z; 3-5 accelerometer x, y, z.
-    parameter : int
-        Index of the parameter, in its effect, that it is multiplied with.
-    """
+    """Where one regressor column acts."""
 
     channel: int
+    """Sensor axis that it changes: 0-2 gyro x, y, z; 3-5 accelerometer x, y, z."""
     parameter: int
+    """Index of the parameter, in its effect, that it is multiplied with."""
 
 
 @dataclass(frozen=True)
@@ -232,19 +219,13 @@ class Effect:
 
 @dataclass(frozen=True)
 class Timetable:
-    """When a recording stands and turns.
-
-    Attributes
-    ----------
-    duration : float
-        Seconds.
-    stops, turns : tuple of (int, float, float)
-        Index of the stop (of the stop before the turn), start and end (s).
-    """
+    """When a recording stands and turns."""
 
     duration: float
+    """Seconds."""
     stops: tuple[tuple[int, float, float], ...]
     turns: tuple[tuple[int, float, float], ...]
+    """`stops`, `turns`: Index of the stop (of the stop before the turn), start and end (s)."""
 
 
 Column = Callable[[Motion], Floats]

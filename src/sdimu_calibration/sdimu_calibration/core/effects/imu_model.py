@@ -22,44 +22,32 @@ from sdimu_calibration.core.units import parse_unit
 
 @dataclass(frozen=True)
 class ImuModel:
-    """The sensor error model that a filter estimates; it shows the filter numbers only.
-
-    Attributes
-    ----------
-    parameters : tuple of Parameter, length p
-    channel, parameter : ndarray of int, shape (m,)
-        Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column.
-    prior : ndarray, shape (p,)
-        One-sigma (SI) that the filter starts from; zero for a coefficient that is known.
-    mean : ndarray, shape (p,)
-        Mean of the prior (SI).
-    restated : ndarray of bool, shape (p,)
-        The model states the prior of this coefficient by itself: it is taken as it is.
-    stated : ndarray, shape (p,)
-        One-sigma (SI) of the specification; `prior` where it was not found too narrow.
-    decay_rate : ndarray, shape (p,)
-        1/s; zero for constants and random walks.
-    drive : ndarray, shape (p,)
-        Variance that a random walk adds per second (SI^2/s); zero for all other parameters.
-    correlation : ndarray, shape (p, p)
-        Of the priors (dimensionless).
-    serving : int
-        How many of the parameters, the last ones, are no coefficients of a sensor: they are estimated along, as
-        attitudes are, and not reported.
-    """
+    """The sensor error model that a filter estimates; it shows the filter numbers only."""
 
     effects: tuple[Effect, ...]
     parameters: tuple[Parameter, ...]
+    """Length p."""
     channel: Ints
     parameter: Ints
+    """`channel`, `parameter`: Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column, shape (m,).
+    """
     prior: Floats
+    """Shape (p,). One-sigma (SI) that the filter starts from; zero for a coefficient that is known."""
     mean: Floats
+    """Mean of the prior (SI), shape (p,)."""
     restated: Bools
+    """Shape (p,). The model states the prior of this coefficient by itself: it is taken as it is."""
     stated: Floats
+    """Shape (p,). One-sigma (SI) of the specification; `prior` where it was not found too narrow."""
     decay_rate: Floats
+    """Shape (p,). 1/s; zero for constants and random walks."""
     drive: Floats
+    """Shape (p,). Variance that a random walk adds per second (SI^2/s); zero for all other parameters."""
     correlation: Floats
+    """Of the priors (dimensionless), shape (p, p)."""
     serving: int = 0
+    """How many of the parameters, the last ones, are no coefficients of a sensor: they are estimated along, as
+    attitudes are, and not reported."""
 
     @property
     def names(self) -> tuple[str, ...]:

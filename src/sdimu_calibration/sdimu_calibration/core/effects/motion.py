@@ -24,54 +24,39 @@ NO_PAST: Memory = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Motion:
-    """The IMU's motion, as free of sensor errors as it is known.
-
-    Attributes
-    ----------
-    t, dt : ndarray, shape (n,)
-        End and length of each cycle (s).
-    w : ndarray, shape (n, 3)
-        Mean body rate against inertial space, in b (rad/s).
-    f : ndarray, shape (n, 3)
-        Mean specific force, in b (m/s^2).
-    C_nb : ndarray, shape (n, 3, 3)
-        Attitude at the middle of the cycle, b to n.
-    w_table : ndarray, shape (n, 3)
-        Mean body rate against the Earth, in b (rad/s); exactly zero at rest.
-    alpha : ndarray, shape (n, 3)
-        Angular acceleration against the Earth, in b (rad/s^2).
-    rest : ndarray of bool, shape (n,)
-        True where the table stands still.
-    temperature, temperature_rate : ndarray, shape (n,)
-        T - T0 (K) and rate (K/s); zero where no temperature is recorded. T0 is `TemperatureLog.origin_degc`.
-    turned, leant : ndarray, shape (n, 3)
-        Sign of the last turn about each axis, and of the last change of specific force along it; 0 before the first.
-    since_turn : ndarray, shape (n,)
-        Time since the last turn ended (s); 0 in turns, infinite before the first.
-    magnetic_n : ndarray, shape (3,)
-        Magnetic field of the site in NED (T).
-    wound : ndarray, shape (n, 3)
-        Angle turned against the Earth about each body axis since the start, with its sign (rad).
-    past : Memory
-        What the block before this one has left, where blocks follow each other.
-    """
+    """The IMU's motion, as free of sensor errors as it is known."""
 
     t: Floats
     dt: Floats
+    """`t`, `dt`: End and length of each cycle (s), shape (n,)."""
     w: Floats
+    """Mean body rate against inertial space, in b (rad/s), shape (n, 3)."""
     f: Floats
+    """Mean specific force, in b (m/s^2), shape (n, 3)."""
     C_nb: Floats
+    """Attitude at the middle of the cycle, b to n, shape (n, 3, 3)."""
     w_table: Floats
+    """Shape (n, 3). Mean body rate against the Earth, in b (rad/s); exactly zero at rest."""
     alpha: Floats
+    """Angular acceleration against the Earth, in b (rad/s^2), shape (n, 3)."""
     rest: Bools
+    """True where the table stands still, shape (n,)."""
     temperature: Floats
     temperature_rate: Floats
+    """`temperature`, `temperature_rate`: Shape (n,). T - T0 (K) and rate (K/s); zero where no temperature is recorded.
+    T0 is `TemperatureLog.origin_degc`."""
     turned: Floats
     leant: Floats
+    """`turned`, `leant`: Shape (n, 3). Sign of the last turn about each axis, and of the last change of specific force
+    along it; 0 before the first."""
     since_turn: Floats
+    """Shape (n,). Time since the last turn ended (s); 0 in turns, infinite before the first."""
     magnetic_n: Floats
+    """Magnetic field of the site in NED (T), shape (3,)."""
     wound: Floats
+    """Angle turned against the Earth about each body axis since the start, with its sign (rad), shape (n, 3)."""
     past: Memory
+    """What the block before this one has left, where blocks follow each other."""
 
     @cached_property
     def left(self) -> dict[tuple[str, float], Floats]:

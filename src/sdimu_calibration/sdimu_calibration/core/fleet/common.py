@@ -42,41 +42,28 @@ STEPS = 127.0
 
 @dataclass(frozen=True)
 class CommonEffect:
-    """One candidate effect over units, in its SI unit.
-
-    Attributes
-    ----------
-    name : str
-        Coefficient.
-    units : int
-        Units that know it.
-    mean, mean_sigma : float
-        Over units.
-    spread : float
-        Standard deviation between units (maximum likelihood).
-    largest_z : float
-        Of the units alone: largest estimate in sigmas.
-    p_value : float
-        If neither mean nor variance is there.
-    q_value : float
-        Smallest rate of false discoveries at which it is named.
-    ratio : float
-        Twice the log of the ratio of likelihoods.
-    alike : tuple of str
-        Effects that the units do not tell from it; empty for those that are not named.
-    """
+    """One candidate effect over units, in its SI unit."""
 
     name: str
+    """Coefficient."""
     units: int
+    """Units that know it."""
     mean: float
     mean_sigma: float
+    """`mean`, `mean_sigma`: Over units."""
     spread: float
+    """Standard deviation between units (maximum likelihood)."""
     largest_z: float
+    """Of the units alone: largest estimate in sigmas."""
     p_value: float
+    """If neither mean nor variance is there."""
     q_value: float
+    """Smallest rate of false discoveries at which it is named."""
     named: bool
     ratio: float = 0.0
+    """Twice the log of the ratio of likelihoods."""
     alike: tuple[str, ...] = ()
+    """Effects that the units do not tell from it; empty for those that are not named."""
 
 
 def common_effects(

@@ -39,21 +39,14 @@ class Sample:
 
 @dataclass(frozen=True)
 class NoiseOfUnit:
-    """Terms of an Allan deviation.
-
-    Attributes
-    ----------
-    source : str
-        Recording, or IMU file.
-    terms : mapping of str to Terms
-        By channel, such as ``gyro_x``, SI.
-    stated : mapping of (str, str) to float
-        Sizes that a file states without their errors (SI), by triad and term.
-    """
+    """Terms of an Allan deviation."""
 
     source: str
+    """Recording, or IMU file."""
     terms: Mapping[str, Terms] = field(default_factory=dict)
+    """By channel, such as ``gyro_x``, SI."""
     stated: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """Sizes that a file states without their errors (SI), by triad and term."""
 
 
 def known_terms() -> dict[str, str]:

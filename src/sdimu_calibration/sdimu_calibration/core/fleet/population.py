@@ -30,25 +30,17 @@ CONTROL = 3.0
 
 @dataclass(frozen=True)
 class Measured:
-    """Results of one type, in one model and body frame.
-
-    Attributes
-    ----------
-    names : tuple of str, length p
-        Coefficients.
-    values, sigmas : ndarray, shape (m, p)
-        SI, one row a result.
-    serials : tuple of str, length m
-        Unit of each result.
-    dates_s : ndarray, shape (m,)
-        Seconds (s) since any common moment; NaN unknown.
-    """
+    """Results of one type, in one model and body frame."""
 
     names: tuple[str, ...]
+    """Coefficients, length p."""
     values: Floats
     sigmas: Floats
+    """`values`, `sigmas`: SI, one row a result, shape (m, p)."""
     serials: tuple[str, ...]
+    """Unit of each result, length m."""
     dates_s: Floats
+    """Shape (m,). Seconds (s) since any common moment; NaN unknown."""
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -121,37 +113,25 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Out:
-    """A unit that does not belong to the population of the others by a coefficient.
-
-    Attributes
-    ----------
-    deviate : float
-        In sigmas.
-    p_value : float
-        Adjusted for all units and coefficients.
-    """
+    """A unit that does not belong to the population of the others by a coefficient."""
 
     unit: str
     coefficient: str
     deviate: float
+    """In sigmas."""
     p_value: float
+    """Adjusted for all units and coefficients."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """A type of units.
-
-    Attributes
-    ----------
-    units : tuple of str, length u
-        Serials.
-    out : tuple of Out
-        Largest deviate first.
-    """
+    """A type of units."""
 
     units: tuple[str, ...]
+    """Serials, length u."""
     coefficients: tuple[Coefficient, ...]
     out: tuple[Out, ...]
+    """Largest deviate first."""
 
 
 def population(fleet: Measured) -> Population:

@@ -33,38 +33,26 @@ _DOUBLINGS = 60
 
 @dataclass(frozen=True)
 class RandomEffect:
-    """What varies between values beyond their known errors, in the unit of the values.
-
-    Attributes
-    ----------
-    spread : float
-        Standard deviation tau.
-    low, high : float
-        Its interval at `LEVEL`.
-    dof : int
-        Values less what was fitted.
-    q : float
-        Weighted sum of squares without a spread (Cochran's Q).
-    p_value : float
-        Probability of such a Q if nothing varies.
-    mean : float
-        Weighted mean of the first group, at x = 0.
-    mean_sigma : float
-        Its standard error.
-    slope, slope_sigma : float
-        Change of the values by unit of x; NaN without x.
-    """
+    """What varies between values beyond their known errors, in the unit of the values."""
 
     spread: float
+    """Standard deviation tau."""
     low: float
     high: float
+    """`low`, `high`: Its interval at `LEVEL`."""
     dof: int
+    """Values less what was fitted."""
     q: float
+    """Weighted sum of squares without a spread (Cochran's Q)."""
     p_value: float
+    """Probability of such a Q if nothing varies."""
     mean: float
+    """Weighted mean of the first group, at x = 0."""
     mean_sigma: float
+    """Its standard error."""
     slope: float = math.nan
     slope_sigma: float = math.nan
+    """`slope`, `slope_sigma`: Change of the values by unit of x; NaN without x."""
 
     @property
     def mean_interval(self) -> tuple[float, float]:

@@ -11,48 +11,33 @@ PASS, FAIL, UNDECIDED, NOT_MEASURED = "pass", "fail", "undecided", "not measured
 
 @dataclass(frozen=True)
 class Line:
-    """One term of a data sheet.
-
-    Attributes
-    ----------
-    term : str
-        Such as ``gyro scale-factor error``.
-    unit, display_unit : str
-        SI, and as people read it.
-    value : float
-        Largest size over axes and units (SI); NaN: not measured.
-    low, high : float
-        Its interval at 95 % (SI); NaN where the source says none.
-    rms : float
-        Root mean square over axes and units (SI); NaN where that has no meaning.
-    of : str
-        Coefficient and unit with the largest size.
-    recordings, units : int
-        How many it is from.
-    method : str
-        How it was found.
-    condition : str
-        Site, temperatures, rates.
-    missing : str
-        What would measure it; empty where it was measured.
-    limit : float
-        Largest size allowed (SI); NaN without a limit.
-    """
+    """One term of a data sheet."""
 
     term: str
+    """Such as ``gyro scale-factor error``."""
     unit: str
     display_unit: str
+    """`unit`, `display_unit`: SI, and as people read it."""
     value: float = math.nan
+    """Largest size over axes and units (SI); NaN: not measured."""
     low: float = math.nan
     high: float = math.nan
+    """`low`, `high`: Its interval at 95 % (SI); NaN where the source says none."""
     rms: float = math.nan
+    """Root mean square over axes and units (SI); NaN where that has no meaning."""
     of: str = ""
+    """Coefficient and unit with the largest size."""
     recordings: int = 0
     units: int = 0
+    """`recordings`, `units`: How many it is from."""
     method: str = ""
+    """How it was found."""
     condition: str = ""
+    """Site, temperatures, rates."""
     missing: str = ""
+    """What would measure it; empty where it was measured."""
     limit: float = math.nan
+    """Largest size allowed (SI); NaN without a limit."""
 
     @property
     def verdict(self) -> str:

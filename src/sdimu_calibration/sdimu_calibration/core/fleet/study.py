@@ -31,26 +31,18 @@ _SHORTEST_S = 60.0
 
 @dataclass(frozen=True)
 class Trend:
-    """Slope of a coefficient with the date.
-
-    Attributes
-    ----------
-    kind : str
-        `PRODUCTION`: between units, by their mean dates; `AGE`: within units that were measured again.
-    slope, slope_sigma : float
-        SI a year.
-    p_value : float
-        If there is no slope.
-    q_value : float
-        Smallest rate of false discoveries at which it is named.
-    """
+    """Slope of a coefficient with the date."""
 
     coefficient: str
     kind: str
+    """`PRODUCTION`: between units, by their mean dates; `AGE`: within units that were measured again."""
     slope: float
     slope_sigma: float
+    """`slope`, `slope_sigma`: SI a year."""
     p_value: float
+    """If there is no slope."""
     q_value: float = 1.0
+    """Smallest rate of false discoveries at which it is named."""
     named: bool = False
 
 
@@ -100,43 +92,30 @@ def _within(fleet: Measured, k: int) -> RandomEffect | None:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Candidate effects of units, each alone beside the model.
-
-    Attributes
-    ----------
-    names, display_units : tuple of str, length k
-    estimates, sigmas : ndarray, shape (m, k)
-        SI, one row a unit; NaN where it does not know an effect.
-    correlations : ndarray of int, shape (m, k, k)
-        Of the estimates in each unit, times `common.STEPS`.
-    """
+    """Candidate effects of units, each alone beside the model."""
 
     names: tuple[str, ...]
     display_units: tuple[str, ...]
+    """`names`, `display_units`: Length k."""
     estimates: Floats
     sigmas: Floats
+    """`estimates`, `sigmas`: Shape (m, k). SI, one row a unit; NaN where it does not know an effect."""
     correlations: Bytes
+    """Of the estimates in each unit, times `common.STEPS`, shape (m, k, k)."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """What results of one type say together.
-
-    Attributes
-    ----------
-    inside : Population
-        Without the units that are out: what priors and control limits are of.
-    slopes : tuple of Trend
-        Of the units that are not out.
-    common : tuple of CommonEffect
-        Effects beyond the baseline, smallest probability first.
-    """
+    """What results of one type say together."""
 
     fleet: Measured
     people: Population
     inside: Population
+    """Without the units that are out: what priors and control limits are of."""
     slopes: tuple[Trend, ...]
+    """Of the units that are not out."""
     common: tuple[CommonEffect, ...]
+    """Effects beyond the baseline, smallest probability first."""
 
 
 def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Study:

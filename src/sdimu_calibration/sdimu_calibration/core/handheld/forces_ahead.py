@@ -10,19 +10,14 @@ from sdimu_calibration.core.arrays import Floats
 
 
 class ForcesAhead(NamedTuple):
-    """Prediction errors.
-
-    Attributes
-    ----------
-    rms : float
-        Over the sigmas of the fit, correlations of the axes of a rest included (1).
-    error, sigma : ndarray, shape (k, 3)
-        Measured less predicted, and what it scatters by with the noise of the fit (m/s^2).
-    """
+    """Prediction errors."""
 
     rms: float
+    """Over the sigmas of the fit, correlations of the axes of a rest included (1)."""
     error: Floats
     sigma: Floats
+    """`error`, `sigma`: Measured less predicted, and what it scatters by with the noise of the fit (m/s^2),
+    shape (k, 3)."""
 
 
 def forces_ahead(Q: Floats, white: Floats, sigma: Floats, k: int) -> ForcesAhead:

@@ -39,40 +39,27 @@ _SEEN = 3.0
 
 @dataclass(frozen=True)
 class Told:
-    """What the user says of a run by hand.
-
-    Attributes
-    ----------
-    whole_sigma : float
-        How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated.
-    rests : tuple of (float, float)
-        Begin and end of every rest (s after the first sample); without any they are found.
-    excluded : tuple of (float, float)
-        Spans (s) of which no rest takes anything; the turns in them count.
-    """
+    """What the user says of a run by hand."""
 
     whole_sigma: float = 0.0
+    """How well the IMU was put back after whole turns about the vertical (rad); 0 where none is stated."""
     rests: tuple[tuple[float, float], ...] = ()
+    """Begin and end of every rest (s after the first sample); without any they are found."""
     excluded: tuple[tuple[float, float], ...] = ()
+    """Spans (s) of which no rest takes anything; the turns in them count."""
 
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A handheld recording, made ready: without impossible samples, its rests found, reduced.
-
-    Attributes
-    ----------
-    impossible : tuple of DataFault
-        What was taken out.
-    notes : tuple of str
-        Which rests tremble, and which were left out.
-    """
+    """A handheld recording, made ready: without impossible samples, its rests found, reduced."""
 
     recording: Recording
     rests: StaticIntervals
     run: HandheldRun
     impossible: tuple[DataFault, ...]
+    """What was taken out."""
     notes: tuple[str, ...] = ()
+    """Which rests tremble, and which were left out."""
 
 
 _NOTHING = Told()

@@ -34,40 +34,29 @@ _ANY_TURN = 10.0
 
 @dataclass(frozen=True)
 class HandheldRun:
-    """A handheld recording, reduced: k rests and the k - 1 turns between them.
-
-    Attributes
-    ----------
-    t, seconds : ndarray, shape (k,)
-        Middle and length of each rest (s).
-    mean : ndarray, shape (k, 6)
-        Mean rate (rad/s) and specific force (m/s^2) at each rest, as measured.
-    first, last : ndarray of int, shape (k - 1,)
-        Cycles of each turn.
-    turn_s, path, gap : ndarray, shape (k - 1,)
-        Duration (s), angle summed over all ways (rad), and uncertainty (rad) of what gaps and steps of the clock leave
-        open of each turn.
-    whole : ndarray of int, shape (w,)
-        Turns that are stated to be whole ones about the vertical: `whole_turns`.
-    whole_sigma : float
-        How well the IMU was put back after them (rad, one sigma).
-    sway : Sway
-        How far the IMU moves about its mean at each rest.
-    """
+    """A handheld recording, reduced: k rests and the k - 1 turns between them."""
 
     t: Floats
     seconds: Floats
+    """`t`, `seconds`: Middle and length of each rest (s), shape (k,)."""
     mean: Floats
+    """Mean rate (rad/s) and specific force (m/s^2) at each rest, as measured, shape (k, 6)."""
     cycles: Cycles
     first: Ints
     last: Ints
+    """`first`, `last`: Cycles of each turn, shape (k - 1,)."""
     turn_s: Floats
     path: Floats
     gap: Floats
+    """`turn_s`, `path`, `gap`: Duration (s), angle summed over all ways (rad), and uncertainty (rad) of what gaps and
+    steps of the clock leave open of each turn, shape (k - 1,)."""
     temperature: TemperatureLog | None
     sway: Sway
+    """How far the IMU moves about its mean at each rest."""
     whole: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Shape (w,). Turns that are stated to be whole ones about the vertical: `whole_turns`."""
     whole_sigma: float = 0.0
+    """How well the IMU was put back after them (rad, one sigma)."""
 
     @property
     def unseen(self) -> Bools:
@@ -159,24 +148,17 @@ def seen_at_rest(run: HandheldRun, C_nb: Floats, rate_n: Floats, gravity: float)
 
 @dataclass(frozen=True)
 class Turns:
-    """Turns, freed of sensor errors.
-
-    Attributes
-    ----------
-    C_nb : ndarray, shape (k - 1, 3, 3)
-        Attitude at the end of each turn, by the gyros, against a frame that does not turn.
-    by_coefficient : ndarray, shape (k - 1, 3, p)
-        Change of that attitude (small turn in n) per unit of each coefficient taken out of the samples.
-    seen : Motion
-        What a perfect IMU saw in every cycle of the recording.
-    weight : ndarray, shape (n, 3, 6)
-        Small turn in n per measured rate (rad/s) and force (m/s^2) of every cycle.
-    """
+    """Turns, freed of sensor errors."""
 
     C_nb: Floats
+    """Attitude at the end of each turn, by the gyros, against a frame that does not turn, shape (k - 1, 3, 3)."""
     by_coefficient: Floats
+    """Change of that attitude (small turn in n) per unit of each coefficient taken out of the samples,
+    shape (k - 1, 3, p)."""
     seen: Motion
+    """What a perfect IMU saw in every cycle of the recording."""
     weight: Floats
+    """Small turn in n per measured rate (rad/s) and force (m/s^2) of every cycle, shape (n, 3, 6)."""
 
     def by_parameter(self, run: HandheldRun, values: Floats, terms: Sequence[tuple[int, int]], count: int) -> Floats:
         """Change of the attitudes per unit of some parameters.

@@ -56,81 +56,55 @@ FORCE, RATE, TURN, WHOLE = 0, 1, 2, 3
 
 @dataclass(frozen=True)
 class FitPriors:
-    """What is known before the fit.
-
-    Attributes
-    ----------
-    kept : ndarray of int, shape (q,)
-        Coefficients that are estimated; the others stay zero (they define the body frame).
-    prior : ndarray, shape (q, q)
-        Covariance of the kept ones.
-    gravity : float
-        Magnitude (m/s^2).
-    earth_mean, earth_sigma : ndarray, shape (3,)
-        Prior of the Earth's rate in n (rad/s); the heading of n is free.
-    gyro_white_noise, accel_white_noise : float
-        Densities.
-    """
+    """What is known before the fit."""
 
     model: ImuModel
     kept: Ints
+    """Shape (q,). Coefficients that are estimated; the others stay zero (they define the body frame)."""
     prior: Floats
+    """Covariance of the kept ones, shape (q, q)."""
     gravity: float
+    """Magnitude (m/s^2)."""
     earth_mean: Floats
     earth_sigma: Floats
+    """`earth_mean`, `earth_sigma`: Shape (3,). Prior of the Earth's rate in n (rad/s); the heading of n is free."""
     gyro_white_noise: float
     accel_white_noise: float
+    """`gyro_white_noise`, `accel_white_noise`: Densities."""
 
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Where the equations stand.
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (p,)
-        SI.
-    C_nb : ndarray, shape (k, 3, 3)
-        Attitudes of the rests (dimensionless).
-    earth : ndarray, shape (3,)
-        Earth's rate (rad/s).
-    extra : ndarray, shape (3,)
-        Learned sigmas of force (m/s^2), rate (rad/s) and turn (rad per rad of way).
-    """
+    """Where the equations stand."""
 
     coefficients: Floats
+    """SI, shape (p,)."""
     C_nb: Floats
+    """Attitudes of the rests (dimensionless), shape (k, 3, 3)."""
     earth: Floats
+    """Earth's rate (rad/s), shape (3,)."""
     extra: Floats
+    """Learned sigmas of force (m/s^2), rate (rad/s) and turn (rad per rad of way), shape (3,)."""
 
 
 @dataclass(frozen=True)
 class HandheldSolution:
-    """Where the fit ended.
-
-    Attributes
-    ----------
-    point : LinearisationPoint
-        ``extra`` holds the learned sigmas: force (m/s^2), rate (rad/s), turn (rad per rad of way).
-    covariance : ndarray, shape (q, q)
-        Of the kept coefficients.
-    earth_sigma : ndarray, shape (3,)
-        Sigma of the Earth's rate after the fit (rad/s).
-    rest_residual : ndarray, shape (k, 6)
-        Of the rests (SI), rates first.
-    turn_residual : ndarray, shape (k - 1, 3)
-        Of the turns (rad).
-    """
+    """Where the fit ended."""
 
     point: LinearisationPoint
+    """``extra`` holds the learned sigmas: force (m/s^2), rate (rad/s), turn (rad per rad of way)."""
     covariance: Floats
+    """Of the kept coefficients, shape (q, q)."""
     earth_sigma: Floats
+    """Sigma of the Earth's rate after the fit (rad/s), shape (3,)."""
     chi2: float
     dof: float
     log_likelihood: float
     ahead: ForcesAhead
     rest_residual: Floats
+    """Of the rests (SI), rates first, shape (k, 6)."""
     turn_residual: Floats
+    """Of the turns (rad), shape (k - 1, 3)."""
     steps: int
 
 

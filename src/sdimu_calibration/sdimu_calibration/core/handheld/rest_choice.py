@@ -37,17 +37,12 @@ of a whole recording is below 2."""
 
 @dataclass(frozen=True)
 class ChosenRests:
-    """The rests that count, and what is to be said of them.
-
-    Attributes
-    ----------
-    notes : tuple of str
-        Rests that tremble, and rests that were left out.
-    """
+    """The rests that count, and what is to be said of them."""
 
     rests: StaticIntervals
     run: HandheldRun
     notes: tuple[str, ...] = ()
+    """Rests that tremble, and rests that were left out."""
 
 
 def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None, excluded: Spans = ()) -> ChosenRests:

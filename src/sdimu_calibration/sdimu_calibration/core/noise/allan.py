@@ -21,27 +21,18 @@ LEAST_FREEDOM = 3.0
 
 @dataclass(frozen=True)
 class Allan:
-    """Allan deviation of one channel.
-
-    Attributes
-    ----------
-    tau : ndarray, shape (k,)
-        Averaging times (s).
-    deviation : ndarray, shape (k,)
-        In the unit of the channel.
-    freedom : ndarray, shape (k,)
-        Equivalent degrees of freedom of the squares, for white noise.
-    interval_s : float
-        Sample interval.
-    lengths : tuple of int
-        Samples of each stretch.
-    """
+    """Allan deviation of one channel."""
 
     tau: Floats
+    """Averaging times (s), shape (k,)."""
     deviation: Floats
+    """In the unit of the channel, shape (k,)."""
     freedom: Floats
+    """Equivalent degrees of freedom of the squares, for white noise, shape (k,)."""
     interval_s: float
+    """Sample interval."""
     lengths: tuple[int, ...]
+    """Samples of each stretch."""
 
     @property
     def sigma(self) -> Floats:

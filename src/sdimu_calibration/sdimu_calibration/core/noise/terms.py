@@ -42,23 +42,18 @@ _ROOM = 2.0
 
 @dataclass(frozen=True)
 class Terms:
-    """Fitted terms of one channel, in the order of `TERMS`.
-
-    Attributes
-    ----------
-    value, sigma : ndarray, shape (4,)
-        Q (unit s), N (unit sqrt(s)), B (unit), K (unit/sqrt(s)), with the unit of the channel.
-    misfit : float
-        Relative error of the variances beyond their standard errors; 0 where the terms explain them.
-    worst_s, worst_ratio : float
-        Averaging time (s) at which the deviation exceeds that of the terms most, and by what factor.
-    """
+    """Fitted terms of one channel, in the order of `TERMS`."""
 
     value: Floats
     sigma: Floats
+    """`value`, `sigma`: Q (unit s), N (unit sqrt(s)), B (unit), K (unit/sqrt(s)), with the unit of the channel,
+    shape (4,)."""
     misfit: float = 0.0
+    """Relative error of the variances beyond their standard errors; 0 where the terms explain them."""
     worst_s: float = 0.0
     worst_ratio: float = 1.0
+    """`worst_s`, `worst_ratio`: Averaging time (s) at which the deviation exceeds that of the terms most, and by what
+    factor."""
 
     @property
     def seen(self) -> Bools:

@@ -26,26 +26,18 @@ _LEAST = 0.1
 
 @dataclass(frozen=True)
 class WhiteNoise:
-    """White noise of both triads.
-
-    Attributes
-    ----------
-    gyro, accel : float
-        Root mean square of the three axes (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-    gyro_sigma, accel_sigma : float
-        Standard errors.
-    channels : tuple of float, length 6
-        Of each sensor; gyros first.
-    rest_s : float
-        Time at rest that was used (s).
-    """
+    """White noise of both triads."""
 
     gyro: float
     accel: float
+    """`gyro`, `accel`: Root mean square of the three axes (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     gyro_sigma: float
     accel_sigma: float
+    """`gyro_sigma`, `accel_sigma`: Standard errors."""
     channels: tuple[float, ...]
+    """Length 6. Of each sensor; gyros first."""
     rest_s: float
+    """Time at rest that was used (s)."""
 
 
 def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> WhiteNoise:

@@ -24,46 +24,31 @@ _UNSEEN = 0.99
 
 @dataclass(frozen=True)
 class Question:
-    """What a plan has to determine.
-
-    Attributes
-    ----------
-    model : Model
-        Its effects are to be determined.
-    known : Known or None
-        What earlier data know of the unit.
-    """
+    """What a plan has to determine."""
 
     site: Site
     imu: ImuSpecification
     model: Model
+    """Its effects are to be determined."""
     known: Known | None = None
+    """What earlier data know of the unit."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Sigmas that a plan reaches, what was known before it counted.
-
-    Attributes
-    ----------
-    names, units : tuple of str, length p
-        Coefficients and their display units.
-    effect : tuple of str, length p
-        Effect of each coefficient.
-    covariance : ndarray, shape (p, p)
-        Frame of the prior; SI.
-    sigma : ndarray, shape (p,)
-        In the reported body frame; SI.
-    prior : ndarray, shape (p,)
-        Sigma before the test; SI.
-    """
+    """Sigmas that a plan reaches, what was known before it counted."""
 
     names: tuple[str, ...]
     units: tuple[str, ...]
+    """`names`, `units`: Coefficients and their display units, length p."""
     effect: tuple[str, ...]
+    """Effect of each coefficient, length p."""
     covariance: Floats
+    """Shape (p, p). Frame of the prior; SI."""
     sigma: Floats
+    """Shape (p,). In the reported body frame; SI."""
     prior: Floats
+    """Shape (p,). Sigma before the test; SI."""
 
     def largest(self) -> dict[str, float]:
         """Largest sigma of each effect's coefficients (SI); those that the body frame fixes do not count."""

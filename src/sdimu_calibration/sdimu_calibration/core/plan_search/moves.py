@@ -16,19 +16,13 @@ from sdimu_calibration.core.plan import Plan, Turn
 
 @dataclass(frozen=True)
 class Abilities:
-    """Rates, acceleration and dwells that the table may use.
-
-    Attributes
-    ----------
-    rates_rad_s : tuple of float
-        Mean rates of turns.
-    dwells_s : tuple of float
-        Lengths of stops.
-    """
+    """Rates, acceleration and dwells that the table may use."""
 
     rates_rad_s: tuple[float, ...]
+    """Mean rates of turns."""
     acceleration_rad_s2: float
     dwells_s: tuple[float, ...]
+    """Lengths of stops."""
 
 
 def whole(plan: Plan, able: Abilities) -> Iterator[list[Plan]]:

@@ -34,20 +34,15 @@ _ACCELERATION_RAD_S2 = math.radians(20.0)
 
 @dataclass(frozen=True)
 class NextTurn:
-    """An extra turn, or two there and back, at the end of a plan.
-
-    Attributes
-    ----------
-    minutes : float
-        Turns and the stops after them.
-    before, after : float
-        Significance in sigma by which the least separable pair differs, without and with the extra turn.
-    """
+    """An extra turn, or two there and back, at the end of a plan."""
 
     turns: tuple[Turn, ...]
     minutes: float
+    """Turns and the stops after them."""
     before: float
     after: float
+    """`before`, `after`: Significance in sigma by which the least separable pair differs, without and with the extra
+    turn."""
 
     @property
     def gain(self) -> float:

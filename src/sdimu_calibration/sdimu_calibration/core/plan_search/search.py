@@ -24,19 +24,13 @@ _WORTH_SHARE = 0.003
 
 @dataclass(frozen=True)
 class Goal:
-    """Goal of the search.
-
-    Attributes
-    ----------
-    limits : mapping of str to float
-        Largest sigma allowed by effect (SI). Empty: the plan that tells most of all coefficients together
-        (`Bounds.spread`), in the time available.
-    minutes : float or None
-        Time available, in which the worst ratio of sigma to limit is minimised; None minimises the time.
-    """
+    """Goal of the search."""
 
     limits: Mapping[str, float]
+    """Largest sigma allowed by effect (SI). Empty: the plan that tells most of all coefficients together
+    (`Bounds.spread`), in the time available."""
     minutes: float | None = None
+    """Time available, in which the worst ratio of sigma to limit is minimised; None minimises the time."""
 
 
 @dataclass(frozen=True)

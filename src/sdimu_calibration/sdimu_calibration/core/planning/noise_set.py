@@ -12,38 +12,28 @@ from sdimu_calibration.core.specification import ImuSpecification, Model
 
 @dataclass(frozen=True)
 class NoiseSet:
-    """Process noise Q, measurement noise R and initial attitude of a filter.
-
-    Attributes
-    ----------
-    gyro_density, accel_density : float
-        Q: white noise that drives the navigation (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-    rate_sigma, force_sigma : float
-        R of Zw and Zf: one sigma of the mean over a second (rad/s, m/s^2); not below the densities.
-    velocity_sigma, position_sigma : float
-        R of Zv and Zp (m/s, m).
-    zero_velocity : str
-        ``every_epoch`` or ``after_motion``.
-    shared_noise : bool
-        Whether the correlation of process and measurement noise is modelled.
-    level_sigma, azimuth_sigma : float
-        Initial attitude (rad).
-    reference : str
-        Name of the published results that it was made to reproduce; empty for none.
-    """
+    """Process noise Q, measurement noise R and initial attitude of a filter."""
 
     name: str
     gyro_density: float
     accel_density: float
+    """`gyro_density`, `accel_density`: Q: white noise that drives the navigation (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     rate_sigma: float
     force_sigma: float
+    """`rate_sigma`, `force_sigma`: R of Zw and Zf: one sigma of the mean over a second (rad/s, m/s^2); not below the
+    densities."""
     velocity_sigma: float
     position_sigma: float
+    """`velocity_sigma`, `position_sigma`: R of Zv and Zp (m/s, m)."""
     zero_velocity: str
+    """``every_epoch`` or ``after_motion``."""
     shared_noise: bool
+    """Whether the correlation of process and measurement noise is modelled."""
     level_sigma: float
     azimuth_sigma: float
+    """`level_sigma`, `azimuth_sigma`: Initial attitude (rad)."""
     reference: str = ""
+    """Name of the published results that it was made to reproduce; empty for none."""
 
 
 def apply(noise: NoiseSet, imu: ImuSpecification, model: Model) -> tuple[ImuSpecification, Model]:

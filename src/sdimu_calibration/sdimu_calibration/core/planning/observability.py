@@ -34,19 +34,13 @@ _ROTATION = {
 
 @dataclass(frozen=True)
 class Combination:
-    """An unobservable combination.
-
-    Attributes
-    ----------
-    weights : tuple of (str, float)
-        Coefficients and weights, in units of their priors; empty for attitude.
-    left : float
-        Share of the prior variance that is left, 0 to 1.
-    """
+    """An unobservable combination."""
 
     text: str
     weights: tuple[tuple[str, float], ...]
+    """Coefficients and weights, in units of their priors; empty for attitude."""
     left: float
+    """Share of the prior variance that is left, 0 to 1."""
 
 
 def unobservable(

@@ -10,24 +10,16 @@ AXES = ("X", "Y", "Z")
 
 @dataclass(frozen=True)
 class AxisLimits:
-    """What one axis of a table can do.
-
-    Attributes
-    ----------
-    rate_rad_s : float
-        Largest rate (rad/s).
-    acceleration_rad_s2 : float
-        Largest angular acceleration (rad/s^2).
-    angle_rad : float
-        Mechanical stops at plus and minus this angle (rad); infinite without stops.
-    cable_turns : float
-        Turns away from zero, either way, that the cable allows; infinite with slip rings.
-    """
+    """What one axis of a table can do."""
 
     rate_rad_s: float = math.radians(400.0)
+    """Largest rate (rad/s)."""
     acceleration_rad_s2: float = math.radians(400.0)
+    """Largest angular acceleration (rad/s^2)."""
     angle_rad: float = math.inf
+    """Mechanical stops at plus and minus this angle (rad); infinite without stops."""
     cable_turns: float = math.inf
+    """Turns away from zero, either way, that the cable allows; infinite with slip rings."""
 
     @property
     def reach_rad(self) -> float:
@@ -46,23 +38,15 @@ class AxisLimits:
 
 @dataclass(frozen=True)
 class RateTable:
-    """A table with three axes, or one that turns about any platform axis.
-
-    Attributes
-    ----------
-    axes : tuple of str or None
-        Platform axis letters about which outer, middle and inner axis turn when all angles are zero; None is a table
-        that turns about any platform axis.
-    joints : tuple of str
-        Names of outer, middle and inner joint in messages; of x, y, z without gimbals.
-    limits : tuple of AxisLimits
-        One for each joint.
-    sample_rate_hz : float
-        Grid of the breakpoints of a move (Hz).
-    """
+    """A table with three axes, or one that turns about any platform axis."""
 
     name: str
     axes: tuple[str, str, str] | None
+    """Platform axis letters about which outer, middle and inner axis turn when all angles are zero; None is a table
+    that turns about any platform axis."""
     joints: tuple[str, str, str]
+    """Names of outer, middle and inner joint in messages; of x, y, z without gimbals."""
     limits: tuple[AxisLimits, AxisLimits, AxisLimits]
+    """One for each joint."""
     sample_rate_hz: float = 100.0
+    """Grid of the breakpoints of a move (Hz)."""

@@ -28,21 +28,14 @@ _ON_GRID = 1e-6
 
 @dataclass(frozen=True)
 class Step:
-    """A turn and the dwell after it.
-
-    Attributes
-    ----------
-    turn : Turn or None
-        Its axis is a platform axis (``X``, ``Y``, ``Z``) or the name of a joint; None only dwells.
-    dwell_s : float
-        Length of the dwell (s).
-    acceleration_rad_s2 : float or None
-        Largest acceleration of the turn (rad/s^2); the limit of the axis when None.
-    """
+    """A turn and the dwell after it."""
 
     turn: Turn | None
+    """Its axis is a platform axis (``X``, ``Y``, ``Z``) or the name of a joint; None only dwells."""
     dwell_s: float
+    """Length of the dwell (s)."""
     acceleration_rad_s2: float | None = None
+    """Largest acceleration of the turn (rad/s^2); the limit of the axis when None."""
 
     @property
     def words(self) -> str:
@@ -55,42 +48,28 @@ class Step:
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A point of a trajectory.
-
-    Attributes
-    ----------
-    time_s : float
-        From the start of the move (s).
-    angles, rates : tuple of float
-        One for each joint (rad, rad/s).
-    """
+    """A point of a trajectory."""
 
     time_s: float
+    """From the start of the move (s)."""
     angles: tuple[float, ...]
     rates: tuple[float, ...]
+    """`angles`, `rates`: One for each joint (rad, rad/s)."""
 
 
 @dataclass(frozen=True)
 class Move:
-    """What is sent to the table for one step.
-
-    Attributes
-    ----------
-    joint : str
-        The joint that turns; empty when none does.
-    axis : (int, float) or None
-        Its index and the sense in which it turns, as `plan_move` takes them.
-    waypoints : tuple of Waypoint
-        At least one; times ascend, the last is the end of the dwell.
-    turn_s : float
-        Length of the turn (s).
-    """
+    """What is sent to the table for one step."""
 
     step: Step
     joint: str
+    """The joint that turns; empty when none does."""
     axis: tuple[int, float] | None
+    """Its index and the sense in which it turns, as `plan_move` takes them."""
     waypoints: tuple[Waypoint, ...]
+    """At least one; times ascend, the last is the end of the dwell."""
     turn_s: float
+    """Length of the turn (s)."""
 
     @property
     def target(self) -> tuple[float, ...]:

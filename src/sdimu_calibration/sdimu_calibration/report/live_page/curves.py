@@ -13,18 +13,12 @@ _AGAIN_S = 5.0
 
 @dataclass(frozen=True)
 class Drawn:
-    """Curves as they are drawn.
-
-    Attributes
-    ----------
-    t : tuple of float, length n
-        Time of the test (s).
-    values : mapping of str to tuple, each of length n
-        By name; None where a curve has not begun.
-    """
+    """Curves as they are drawn."""
 
     t: tuple[float, ...]
+    """Time of the test (s), length n."""
     values: Mapping[str, tuple[float | None, ...]]
+    """Each of length n. By name; None where a curve has not begun."""
 
 
 class Curves:

@@ -26,64 +26,44 @@ PARTS = (HEAD, CURVES, STOPS, DIAGNOSIS, CHOICES, ANSWER)
 
 @dataclass(frozen=True)
 class End:
-    """How a test ended.
-
-    Attributes
-    ----------
-    good : bool
-        It came to its end.
-    words : str
-        One sentence.
-    command : str
-        Shows the report; empty where there is none.
-    """
+    """How a test ended."""
 
     good: bool
+    """It came to its end."""
     words: str
+    """One sentence."""
     command: str = ""
+    """Shows the report; empty where there is none."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """Where a test is, in words.
-
-    Attributes
-    ----------
-    share : float or None
-        Of the test that is done (0 to 1); None where nobody knows how long it is.
-    end : End or None
-        None while more may come.
-    """
+    """Where a test is, in words."""
 
     place: str = "waiting for the first message"
     time: str = ""
     light: str = ""
     share: float | None = None
+    """Of the test that is done (0 to 1); None where nobody knows how long it is."""
     end: End | None = None
+    """None while more may come."""
 
 
 @dataclass(frozen=True)
 class _Kept:
-    """What a record holds.
-
-    Attributes
-    ----------
-    nis : tuple of (int, mapping)
-        Stop, and mean squared innovation per degree of freedom by channel.
-    errors : tuple of (int, rows)
-        Stop that a diagnosis is of, and the error of each model.
-    joined_s : float
-        Time of the test (s) from which it was watched.
-    """
+    """What a record holds."""
 
     head: Head = field(default_factory=Head)
     fallen: tuple[Falling, ...] = ()
     nis: tuple[tuple[int, Mapping[str, float]], ...] = ()
+    """Stop, and mean squared innovation per degree of freedom by channel."""
     diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
     errors: tuple[tuple[int, Rows], ...] = ()
+    """Stop that a diagnosis is of, and the error of each model."""
     choices: tuple[SeenChoice, ...] = ()
     answer: str = ""
     joined_s: float = 0.0
+    """Time of the test (s) from which it was watched."""
 
 
 @dataclass(frozen=True, kw_only=True)

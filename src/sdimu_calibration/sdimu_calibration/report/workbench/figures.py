@@ -74,18 +74,12 @@ def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
 
 @dataclass(frozen=True)
 class Curve:
-    """What is drawn of a fit.
-
-    Attributes
-    ----------
-    y : ndarray, shape (e, 12)
-        Residuals (sigma).
-    signature : ndarray, shape (e, 12), or None
-        What the candidate that is looked at would take out of them.
-    """
+    """What is drawn of a fit."""
 
     y: Floats
+    """Residuals (sigma), shape (e, 12)."""
     signature: Floats | None = None
+    """What the candidate that is looked at would take out of them, shape (e, 12)."""
     name: str = ""
 
 

@@ -51,95 +51,65 @@ _MOST_KEPT = 200
 
 @dataclass(frozen=True)
 class Fitted:
-    """The numbers of one fit.
-
-    Attributes
-    ----------
-    calibration : Calibration
-        Without the history of its first pass.
-    prior, mean : ndarray, shape (p,)
-        Sigma and mean of each coefficient's prior (SI).
-    stated : ndarray, shape (p,)
-        One-sigma (SI) that the IMU's file, or physics, gives each coefficient.
-    grid : Grid
-        Normalised means, channel by stop.
-    begin : ndarray, shape (e,)
-        Start of each epoch (s).
-    axes : mapping of str to ndarray, shape (e,)
-        What they can be drawn against.
-    left_out : ndarray, shape (e, 12)
-        Prediction errors (sigma) of what the fit has not seen; NaN elsewhere.
-    held_out : float
-        Leave-one-stop-out RMS over the stops of the fit (sigma).
-    at_held : float or None
-        RMS of `left_out`.
-    start : Start
-        Where a fit with one effect more begins.
-    """
+    """The numbers of one fit."""
 
     calibration: Calibration
+    """Without the history of its first pass."""
     prior: Floats
     mean: Floats
+    """`prior`, `mean`: Sigma and mean of each coefficient's prior (SI), shape (p,)."""
     stated: Floats
+    """One-sigma (SI) that the IMU's file, or physics, gives each coefficient, shape (p,)."""
     grid: data.Grid
+    """Normalised means, channel by stop."""
     residuals: data.Residuals
     begin: Floats
+    """Start of each epoch (s), shape (e,)."""
     axes: Mapping[str, Floats]
+    """What they can be drawn against, shape (e,)."""
     left_out: Floats
+    """Shape (e, 12). Prediction errors (sigma) of what the fit has not seen; NaN elsewhere."""
     held_out: float
+    """Leave-one-stop-out RMS over the stops of the fit (sigma)."""
     at_held: float | None
+    """RMS of `left_out`."""
     start: Start
+    """Where a fit with one effect more begins."""
 
 
 @dataclass(frozen=True)
 class Missing:
-    """What a fit does not explain.
-
-    Attributes
-    ----------
-    entries : tuple of Scored
-        All candidates, largest score first.
-    threshold : float
-        Size of the score that pure noise reaches.
-    held_out : float or None
-        Error at stops or rests held out (sigma), as `sdimu calibrate` has it.
-    mended : bool
-        Effects were found, and the model with them explains the recording.
-    probabilities : Probabilities or None
-        Of nothing, and of each family of effects, as `sdimu diagnose` has them.
-    unknown : tuple of UnknownFunction
-        Errors that no effect explains, by what they follow.
-    worst : Off or None
-        The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
-    """
+    """What a fit does not explain."""
 
     entries: tuple[data.Scored, ...]
+    """All candidates, largest score first."""
     threshold: float
+    """Size of the score that pure noise reaches."""
     adequate: bool
     sentence: str
     left: FreeInputTest
     held_out: float | None
+    """Error at stops or rests held out (sigma), as `sdimu calibrate` has it."""
     probabilities: Probabilities | None = None
+    """Of nothing, and of each family of effects, as `sdimu diagnose` has them."""
     unknown: tuple[UnknownFunction, ...] = ()
+    """Errors that no effect explains, by what they follow."""
     mended: bool = False
+    """Effects were found, and the model with them explains the recording."""
     worst: Off | None = None
+    """The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
+    """
 
 
 @dataclass(frozen=True)
 class Preview:
-    """A candidate before it is added, by the linear model.
-
-    Attributes
-    ----------
-    effect : Effect
-        The first, where a text gives several.
-    residuals : Residuals
-        `before` and `after` it is added.
-    """
+    """A candidate before it is added, by the linear model."""
 
     effect: Effect
+    """The first, where a text gives several."""
     what: Addition
     residuals: data.Residuals
+    """`before` and `after` it is added."""
 
 
 class FitSession:

@@ -13,24 +13,16 @@ Prior = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Setting:
-    """What is fitted.
-
-    Attributes
-    ----------
-    added : tuple of str
-        Effects added to the model, in order: what `sdimu calibrate --add` takes, or the text of an effect file.
-    held : tuple of int
-        Stops left out of the fit, ascending.
-    cut : tuple of (float, float)
-        Spans of time (s) left out, ascending and apart.
-    priors : tuple of (str, str, str)
-        Coefficients with a prior of their own.
-    """
+    """What is fitted."""
 
     added: tuple[str, ...] = ()
+    """Effects added to the model, in order: what `sdimu calibrate --add` takes, or the text of an effect file."""
     held: tuple[int, ...] = ()
+    """Stops left out of the fit, ascending."""
     cut: tuple[Span, ...] = ()
+    """Spans of time (s) left out, ascending and apart."""
     priors: tuple[Prior, ...] = ()
+    """Coefficients with a prior of their own."""
 
     def rung(self, count: int) -> Setting:
         """Return the setting with the first effects alone; priors of coefficients that it has not then go, too."""

@@ -19,28 +19,19 @@ _MOST_STEPS = 100
 
 @dataclass(frozen=True)
 class State:
-    """Where a page stands.
-
-    Attributes
-    ----------
-    now : Setting
-        What is fitted.
-    cell : tuple of (int, int) or None
-        Channel and stop that are looked at.
-    past, future : tuple of Setting
-        What undo and redo go to; the last one is the next to go to.
-    seen : tuple of Setting
-        Everything that was fitted in this page, for comparison; an undo does not forget it.
-    recording : str
-        Name of the recording; empty is the one a fresh page shows.
-    """
+    """Where a page stands."""
 
     now: Setting = field(default_factory=Setting)
+    """What is fitted."""
     cell: tuple[int, int] | None = None
+    """Channel and stop that are looked at."""
     past: tuple[Setting, ...] = ()
     future: tuple[Setting, ...] = ()
+    """`past`, `future`: What undo and redo go to; the last one is the next to go to."""
     seen: tuple[Setting, ...] = field(default=(), compare=False)
+    """Everything that was fitted in this page, for comparison; an undo does not forget it."""
     recording: str = ""
+    """Name of the recording; empty is the one a fresh page shows."""
 
     def as_json(self) -> dict[str, Any]:
         """Return it as the page keeps it."""

@@ -20,22 +20,17 @@ FORMAT: Final = "sdimu-datasheet/1"
 
 @dataclass(frozen=True)
 class Certificate:
-    """Who vouches for what; empty where nobody said it.
-
-    Attributes
-    ----------
-    serial, date, operator, plan, version : str
-        Unit, day of the certificate, person, test plan, version of the program.
-    recordings : tuple of (str, str)
-        Name and SHA-256 of each file of the recordings; the second is empty where the file was not found.
-    """
+    """Who vouches for what; empty where nobody said it."""
 
     serial: str = ""
     date: str = ""
     operator: str = ""
     plan: str = ""
     version: str = ""
+    """`serial`, `date`, `operator`, `plan`, `version`: Unit, day of the certificate, person, test plan, version of the
+    program."""
     recordings: tuple[tuple[str, str], ...] = ()
+    """Name and SHA-256 of each file of the recordings; the second is empty where the file was not found."""
 
 
 class HashedFile(ResultModel):

@@ -32,22 +32,15 @@ Diagnosis = DiagnosisFile | SetDiagnosisFile
 
 @dataclass(frozen=True)
 class Entry:
-    """A result of a folder.
-
-    Attributes
-    ----------
-    name : str
-        Folder of the result, as seen from the folder that was asked for.
-    path : Path
-        Its folder.
-    diagnosis : DiagnosisFile or SetDiagnosisFile or None
-        Content of diagnosis.json or set.json beside it.
-    """
+    """A result of a folder."""
 
     name: str
+    """Folder of the result, as seen from the folder that was asked for."""
     path: Path
+    """Its folder."""
     result: Calibration
     diagnosis: Diagnosis | None
+    """Content of diagnosis.json or set.json beside it."""
 
     @property
     def unit(self) -> str:
@@ -62,21 +55,14 @@ class Entry:
 
 @dataclass(frozen=True)
 class Gathered:
-    """What a folder holds.
-
-    Attributes
-    ----------
-    entries : tuple of Entry
-        Of the type that most results are of, in the order of their dates.
-    apart : tuple of str
-        One line for every result that does not fit.
-    given : tuple of Entry
-        Results with diagnosis.json, of the IMU and body frame of `entries`, one a recording, whatever was found.
-    """
+    """What a folder holds."""
 
     entries: tuple[Entry, ...]
+    """Of the type that most results are of, in the order of their dates."""
     apart: tuple[str, ...]
+    """One line for every result that does not fit."""
     given: tuple[Entry, ...]
+    """Results with diagnosis.json, of the IMU and body frame of `entries`, one a recording, whatever was found."""
 
 
 def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:

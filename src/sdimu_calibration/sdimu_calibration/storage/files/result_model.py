@@ -112,17 +112,12 @@ class Entry:
     """In ``Annotated[KIND, Entry()]``: an object of the file that is a dataclass of the core, field by field.
 
     Words are read on one line; ``null`` is the default of the field, or NaN; an array that is missing is empty.
-
-    Attributes
-    ----------
-    also : mapping of str to callable
-        What is written beside the fields, from the object; passed over when the file is read.
-    seldom : tuple of str
-        Fields that are written only where they hold something.
     """
 
     also: Mapping[str, Callable[[Any], Any]] = field(default_factory=dict, hash=False)
+    """What is written beside the fields, from the object; passed over when the file is read."""
     seldom: tuple[str, ...] = ()
+    """Fields that are written only where they hold something."""
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
         """Make the schema of the dataclass that is annotated."""

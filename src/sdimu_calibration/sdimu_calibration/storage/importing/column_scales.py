@@ -27,25 +27,17 @@ _FAR = 0.3
 
 
 class Scale(NamedTuple):
-    """How numbers become SI.
-
-    Attributes
-    ----------
-    counts : float
-        Numbers of one unit.
-    bias : float
-        Number of zero.
-    why : str
-        By what it was recognised.
-    sign : tuple of int
-        1 or -1 of each axis.
-    """
+    """How numbers become SI."""
 
     unit: str
     counts: float
+    """Numbers of one unit."""
     bias: float
+    """Number of zero."""
     why: str
+    """By what it was recognised."""
     sign: tuple[int, int, int] = AS_RECORDED
+    """1 or -1 of each axis."""
 
     @property
     def factor(self) -> float:

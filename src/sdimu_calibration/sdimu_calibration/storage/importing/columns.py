@@ -37,15 +37,10 @@ class Pair(NamedTuple):
 
 
 class Named(NamedTuple):
-    """Three columns whose headings call them one sensor.
-
-    Attributes
-    ----------
-    which : str
-        What tells the IMU from others in the file.
-    """
+    """Three columns whose headings call them one sensor."""
 
     which: str
+    """What tells the IMU from others in the file."""
     columns: Three
     unit: str
 

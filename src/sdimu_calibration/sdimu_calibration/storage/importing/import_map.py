@@ -77,28 +77,19 @@ Sign = Literal[1, -1]
 
 
 class TimeMap(Schema):
-    """Where the times are.
-
-    Attributes
-    ----------
-    column : int or str, optional
-        Number from 1, heading, or variable.
-    unit : str
-        Of time (s, ms, us, ns, min, h), a whole number of it (``10ms``), or ``iso8601``.
-    start : datetime, optional
-        The moment at which the column is zero (UTC unless it says otherwise); 1970 when it is left out.
-    rate_hz : float, optional
-        In place of a column: samples come at this rate.
-    counter : int or str, optional
-        Column that counts the samples: it is the clock, at `rate_hz` or at the rate that the times in `column` have in
-        the mean. What it leaves out is missing.
-    """
+    """Where the times are."""
 
     column: Column | None = None
+    """Number from 1, heading, or variable."""
     unit: Annotated[str, BeforeValidator(_time_unit)] = "s"
+    """Of time (s, ms, us, ns, min, h), a whole number of it (``10ms``), or ``iso8601``."""
     start: datetime | None = None
+    """The moment at which the column is zero (UTC unless it says otherwise); 1970 when it is left out."""
     rate_hz: float | None = Field(default=None, gt=0.0)
+    """In place of a column: samples come at this rate."""
     counter: Column | None = None
+    """Column that counts the samples: it is the clock, at `rate_hz` or at the rate that the times in `column` have in
+    the mean. What it leaves out is missing."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> TimeMap:
@@ -111,25 +102,18 @@ class SensorMap(Schema):
     """Three axes of one kind of sensor: value = sign * (raw - bias) / counts_per_unit, in `unit`.
 
     A unit of angle, or of velocity, means increments over the interval of the samples.
-
-    Attributes
-    ----------
-    columns : tuple of int or str
-        Three, or one variable with three columns.
-    file : str, optional
-        Pattern of the name of the file that holds them; needed when several files are given.
-    time : int or str, optional
-        Column of the times, where it is not the common one.
-    counts_per_unit, bias : tuple of three float
-        Raw counts; the bias is the nominal one, such as half of the converter's range.
     """
 
     columns: Annotated[tuple[Column, ...], BeforeValidator(_listed)]
+    """Three, or one variable with three columns."""
     unit: str
     file: str | None = None
+    """Pattern of the name of the file that holds them; needed when several files are given."""
     time: Column | None = None
+    """Column of the times, where it is not the common one."""
     counts_per_unit: Three = (1.0, 1.0, 1.0)
     bias: Three = (0.0, 0.0, 0.0)
+    """`counts_per_unit`, `bias`: Raw counts; the bias is the nominal one, such as half of the converter's range."""
     sign: Annotated[tuple[Sign, Sign, Sign], BeforeValidator(_three)] = (1, 1, 1)
 
     @model_validator(mode="after")
@@ -184,54 +168,29 @@ def _each(value: Any) -> list[Any]:
 
 
 class PhaseMap(Schema):
-    """Which rows are at rest.
-
-    Attributes
-    ----------
-    column : int or str
-        Holds a word or a number.
-    rest : tuple of str
-        What it says at rest; ``*`` stands for anything (``pos*``). Another word of them begins another rest.
-    file : str, optional
-        As of a sensor.
-    """
+    """Which rows are at rest."""
 
     column: Column
+    """Holds a word or a number."""
     rest: Annotated[tuple[str, ...], BeforeValidator(_words)] = ("rest", "dwell", "static", "still", "true", "1")
+    """What it says at rest; ``*`` stands for anything (``pos*``). Another word of them begins another rest."""
     file: str | None = None
+    """As of a sensor."""
 
 
 class BinaryMap(Schema):
-    """Numbers of one kind in a file, row after row, without anything else.
-
-    Attributes
-    ----------
-    columns : int
-        Numbers of a row.
-    skip_bytes : int
-        Before the first number.
-    """
+    """Numbers of one kind in a file, row after row, without anything else."""
 
     type: Literal["float64", "float32", "int64", "int32", "int16"]
     columns: int = Field(gt=0)
+    """Numbers of a row."""
     big_endian: bool = False
     skip_bytes: int = Field(default=0, ge=0)
+    """Before the first number."""
 
 
 class ImportMap(Schema):
-    """What the columns of the files are.
-
-    Attributes
-    ----------
-    delimiter : str, optional
-        Between the columns of a text file; recognised when left out.
-    decimal : str, optional
-        Decimal sign of a text file; recognised when left out.
-    skip_lines : int, optional
-        Lines before the data of a text file, the last of them with the headings; recognised when left out.
-    binary : BinaryMap, optional
-        Of files that are neither text nor MAT nor NPZ.
-    """
+    """What the columns of the files are."""
 
     format: Literal["sdimu-import/1"]
     name: str | None = None
@@ -241,9 +200,13 @@ class ImportMap(Schema):
     temperature: TemperatureMap | None = None
     phase: PhaseMap | None = None
     delimiter: Annotated[str, AfterValidator(_one_character)] | None = None
+    """Between the columns of a text file; recognised when left out."""
     decimal: Literal[".", ","] | None = None
+    """Decimal sign of a text file; recognised when left out."""
     skip_lines: int | None = Field(default=None, ge=0)
+    """Lines before the data of a text file, the last of them with the headings; recognised when left out."""
     binary: BinaryMap | None = None
+    """Of files that are neither text nor MAT nor NPZ."""
 
 
 def load_import_map(name_or_path: str | Path) -> ImportMap:

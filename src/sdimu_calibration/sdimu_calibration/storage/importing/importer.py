@@ -25,28 +25,19 @@ APART_NS = 60_000_000_000
 
 @dataclass(frozen=True)
 class Imported:
-    """Samples as a bag holds them.
-
-    Attributes
-    ----------
-    ns : ndarray of int64, shape (n,)
-        Stamps (ns since 1970), as the file has them: gaps, jitter and repetitions stay.
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        rad/s, m/s^2; NaN where the file says so.
-    temperature : (ndarray (m,), ndarray (m,)) or None
-        Stamps (ns), deg C.
-    notes : tuple of str
-        What was done beyond copying.
-    status : Status or None
-        Where a column says what is a rest.
-    """
+    """Samples as a bag holds them."""
 
     ns: Stamps
+    """Shape (n,). Stamps (ns since 1970), as the file has them: gaps, jitter and repetitions stay."""
     omega_ib_b: Floats
     f_ib_b: Floats
+    """`omega_ib_b`, `f_ib_b`: Shape (n, 3). rad/s, m/s^2; NaN where the file says so."""
     temperature: tuple[Stamps, Floats] | None
+    """Stamps (ns), deg C."""
     notes: tuple[str, ...]
+    """What was done beyond copying."""
     status: Status | None = None
+    """Where a column says what is a rest."""
 
     def later(self, by_ns: int) -> Imported:
         """Return the same samples at later times."""

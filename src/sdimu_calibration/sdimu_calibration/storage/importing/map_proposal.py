@@ -32,19 +32,13 @@ _LONGEST_SUFFIX = 40
 
 @dataclass(frozen=True)
 class Proposal:
-    """A map.
-
-    Attributes
-    ----------
-    suffix : str
-        For the names of its file and of the bag; empty where a file holds one IMU.
-    words : tuple of str
-        What was recognised by what, and what is left to the user.
-    """
+    """A map."""
 
     suffix: str
+    """For the names of its file and of the bag; empty where a file holds one IMU."""
     text: str
     words: tuple[str, ...]
+    """What was recognised by what, and what is left to the user."""
 
 
 def propose_maps(paths: Sequence[Path]) -> list[Proposal]:

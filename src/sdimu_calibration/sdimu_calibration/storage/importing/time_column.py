@@ -29,22 +29,15 @@ _EVEN = 0.1
 
 
 class TimeColumn(NamedTuple):
-    """The clock of a file.
-
-    Attributes
-    ----------
-    column : int or str
-        Heading, or number from 1; empty where there is none.
-    rate_hz : float
-        0 where nothing says it.
-    why : str
-        How it was recognised.
-    """
+    """The clock of a file."""
 
     column: int | str
+    """Heading, or number from 1; empty where there is none."""
     unit: str
     rate_hz: float
+    """0 where nothing says it."""
     why: str
+    """How it was recognised."""
 
     @property
     def known(self) -> bool:
