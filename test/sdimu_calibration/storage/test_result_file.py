@@ -189,8 +189,10 @@ def _damaged(tmp_path, key, value):
         (("history", "stop"), [0.5] * 7, "history.stop: a list of numbers"),
         (("history", "stop"), [-1e308] * 7, "history.stop: a list of numbers"),
         (("history", "dwell"), [2] * 7, "history.dwell: a list of numbers"),
-        (("fit", "held_out_rms"), [1, 2], "fit.held_out_rms."),
-        (("fit", "held_out_rms"), "loud", "fit.held_out_rms."),
+        (("fit", "held_out_rms"), [1, 2], "(fit.held_out_rms: a number is expected)"),
+        (("fit", "held_out_rms"), "loud", "(fit.held_out_rms: a number is expected)"),
+        (("fit", "held_out_rms"), True, "(fit.held_out_rms: a number is expected)"),
+        (("data", "duration_s"), "600", "(data.duration_s: a number is expected)"),
     ],
 )
 def test_numbers_that_are_none_and_units_that_are_not_taken_are_refused(tmp_path, key, value, told):

@@ -9,15 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    StrictFloat,
-    StrictInt,
-    model_serializer,
-)
+from pydantic import AfterValidator, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import registry
@@ -48,6 +40,7 @@ from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_model import (
     Array,
     Entry,
+    Figure,
     Line,
     Number,
     ResultModel,
@@ -104,6 +97,7 @@ class Data(ResultModel):
     """What was counted in the data, and their faults, which come last."""
 
     model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Figure | None]
     faults: tuple[Annotated[DataFault, Entry()], ...] = ()
 
     @model_serializer(mode="wrap")
@@ -147,7 +141,7 @@ class ResultFile(ResultModel):
     model: tuple[Word, ...]
     coefficients: tuple[Coefficient, ...]
     covariance: Array
-    fit: dict[str, StrictInt | StrictFloat | None]
+    fit: dict[str, Figure | None]
     data: Data
     references: tuple[Annotated[Reference, Entry()], ...] = ()
     noise: tuple[Annotated[NoiseTerm, Entry({"unit": lambda term: term.unit})], ...] = ()

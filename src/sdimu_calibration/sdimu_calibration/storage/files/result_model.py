@@ -79,6 +79,12 @@ def _or(default: Any, value: Any) -> Any:
     return default if value is None else value
 
 
+def _figure(value: Any) -> int | float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("a number is expected")
+    return value
+
+
 def _array(dtype: Any, value: Any) -> NDArray[Any]:
     try:
         given = np.array(value)
@@ -100,6 +106,8 @@ def _array(dtype: Any, value: Any) -> NDArray[Any]:
 _NO_NUMBERS = "a list of numbers is expected, rows of equal length"
 Number = Annotated[float, Strict(), BeforeValidator(partial(_or, _NAN))]
 """A number, and no text that looks like one; ``null`` is NaN."""
+Figure = Annotated[int | float, PlainValidator(_figure)]
+"""A number as the file has it, whole or not."""
 Line = Annotated[str, BeforeValidator(lambda value: one_line(str(value)))]
 Said = Annotated[str, BeforeValidator(lambda value: one_line(str(value), None))]
 """What is told to people, however long."""
