@@ -226,7 +226,7 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
             minutes = start.duration_s / 60.0
         found = search(start, asked.question, able, Goal(limits, minutes), allowed.tries, progress)
     known = already(asked.question) if before else None
-    if start.turns and not found.plan.turns:
+    if not found.plan.turns:
         say(
             console,
             f"no plan with the attitudes of {start.name} that turns the IMU fits in --minutes {minutes:g}; no file "

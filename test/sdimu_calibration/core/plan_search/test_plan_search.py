@@ -47,6 +47,12 @@ def test_a_turn_says_what_it_changes_in_digits_that_show_it(before, after, words
     assert turn.text == f"turn Y +180 deg at 10 deg/s (4.0 min): {words}"
 
 
+def test_a_plan_without_turns_is_no_plan_to_begin_with():
+    still = replace(KIM18, name="still", dwell_s=KIM18.dwell_s[:1], turns=())
+    with pytest.raises(DataError, match="still: a search changes the turns of a plan, and this one has none"):
+        search(still, ASKED, ABLE, Goal({}, 10.0), 1)
+
+
 @pytest.mark.parametrize("moves", [whole, single])
 def test_every_change_ends_at_the_same_attitude_and_stops_nowhere_new_but_half_way(moves):
     known = attitudes(KIM18)

@@ -74,13 +74,14 @@ def search(
         The start itself when no change improves it. In `minutes` where any change makes it fit, whatever `tries`;
         else the shortest.
     """
+    if not start.turns:
+        raise DataError(
+            f"{start.name}: a search changes the turns of a plan, and this one has none: begin with another"
+        )
     if not goal.limits and goal.minutes is None:
         raise DataError("a plan needs a goal: state limits, or the minutes available")
     first = bounds(start, asked)
-    unknown = sorted(goal.limits.keys() - first.largest().keys())
-    if unknown:
-        there = ", ".join(first.largest())
-        raise DataError(f"limit for '{unknown[0]}': not an effect of the model (there are: {there})")
+    _check_limits(goal, first)
     best = Found(start, first, _worst(first, goal), 1)
     fits = start if goal.minutes is None else within(start, able, goal.minutes)
     if fits is not start:
@@ -123,6 +124,13 @@ def search(
                 going = True
                 break
     return replace(best, tried=tried)
+
+
+def _check_limits(goal: Goal, first: Bounds) -> None:
+    unknown = sorted(goal.limits.keys() - first.largest().keys())
+    if unknown:
+        there = ", ".join(first.largest())
+        raise DataError(f"limit for '{unknown[0]}': not an effect of the model (there are: {there})")
 
 
 def _worst(told: Bounds, goal: Goal) -> float:
