@@ -256,7 +256,7 @@ def test_advice_repeats_what_was_asked_for():
         "b",
     ]
     more = Advice(Kind.RECORD_ONCE_MORE, ("a", ("b",), "turn X"), Verb.CONTINUE)
-    assert sentence(more).endswith("turn X; for a whole plan: sdimu plan --after")
+    assert sentence(more).endswith("turn X; for a whole plan: sdimu plan --after.")
     assert spelled(more, asked) == "sdimu plan --after out"
     back = Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)
     assert sentence(back).endswith("The other order: sdimu plan --plan YOURS --backwards.")

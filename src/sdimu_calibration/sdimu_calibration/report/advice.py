@@ -7,7 +7,6 @@ from collections.abc import Callable
 from html import escape
 
 from sdimu_calibration.core.advice import Advice
-from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.report.markup import prose
 from sdimu_calibration.storage.files.advice_words import lead, sentence
 
@@ -23,10 +22,10 @@ def advice_html(advice: Advice | str, spell: Spell | None) -> str:
         return _marked(advice)
     command = "" if spell is None else spell(advice)
     if not command:
-        return _marked(capital(sentence(advice)))
+        return _marked(sentence(advice))
     # A browser breaks a line after a hyphen: a word of a command stays whole.
     whole = " ".join(f"<span>{escape(word)}</span>" for word in command.split(" "))
-    return f'{_marked(f"{capital(lead(advice))}:")} <code class="command">{whole}</code>'
+    return f'{_marked(f"{lead(advice)}:")} <code class="command">{whole}</code>'
 
 
 def _marked(text: str) -> str:

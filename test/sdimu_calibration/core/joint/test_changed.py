@@ -40,7 +40,7 @@ def test_scale_factors_of_the_accelerometers_that_differ_alike_are_those_of_anot
     found = diagnose_set(unit_set(37, [short()] * 3, shift={2: shift}).members, options, here)
     assert {(f.label, f.recording) for f in found.findings} == {(name, "r2") for name in shift}
     assert found.verdict == Verdict.DATA_FAULT
-    assert sentence(found.advice[0]).startswith("check the site of r2: ")
+    assert sentence(found.advice[0]).startswith("Check the site of r2: ")
 
 
 def changed(axis: str, ppm: float, recording: str = "r2") -> SetFinding:

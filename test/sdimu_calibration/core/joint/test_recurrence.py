@@ -161,7 +161,7 @@ def _found(answer: tuple[str, ...], apart: bool, scores: tuple[float, float, flo
     ("found", "words", "step"),
     [
         (_found((TIME,), True, (0.1, 4.5, 0.2)), "comes back at the same time after the start (accel_x: corr", "warm"),
-        (_found((TEMPERATURE,), True, (0.1, 0.5, 4.2)), "it belongs to the temperature", "soaks"),
+        (_found((TEMPERATURE,), True, (0.1, 0.5, 4.2)), "it belongs to the temperature", "Soaks"),
         (_found((), True, (0.1, 0.5, np.nan)), "does not come back at the same attitude or time after the", "mount"),
         (_found((), True, (0.1, 2.5, np.nan)), "is open: nearest is the same time after the start", "--backwards"),
         (_found((), True, (np.nan, np.nan, np.nan)), "share too few stops", "--backwards"),

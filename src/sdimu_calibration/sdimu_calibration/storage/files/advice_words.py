@@ -14,8 +14,7 @@ def sentence(advice: Advice) -> str:
     command = general_command(advice)
     if not command:
         return lead(advice)
-    # Lines about a set are no sentences.
-    return f"{lead(advice)}: {command}" + ("." if lead(advice)[0].isupper() else "")
+    return f"{lead(advice)}: {command}."
 
 
 def lead(advice: Advice) -> str:
@@ -140,45 +139,45 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.TURN_BOTH_WAYS: lambda: "turn about that axis both ways, slowly and fast",
     Kind.REST_BETWEEN: lambda: "rest in more attitudes between the axes, both ends of that axis up",
     Kind.REVERSE_AND_ADD: lambda: (
-        "record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these"
+        "Record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these."
     ),
     Kind.TRY_FORCE_EQUATION: lambda: (
-        "what comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation of "
-        "the specific force (sdimu diagnose BAG --try FILE)"
+        "What comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation of "
+        "the specific force (sdimu diagnose BAG --try FILE)."
     ),
     Kind.BEGIN_LATER: lambda: (
-        "what comes back at the same time ends when the unit is warm: begin the plan later, or make the first stop "
-        "longer"
+        "What comes back at the same time ends when the unit is warm: begin the plan later, or make the first stop "
+        "longer."
     ),
     Kind.SOAK_MORE: lambda: (
-        "soaks tell what comes back at the same temperature: record at more temperatures, each held constant"
+        "Soaks tell what comes back at the same temperature: record at more temperatures, each held constant."
     ),
     Kind.LOOK_AT_MOUNT: lambda: (
-        "what does not come back belongs to each run: check mount, cables and floor; until then count it as scatter"
+        "What does not come back belongs to each run: check mount, cables and floor; until then count it as scatter."
     ),
     Kind.LOOK_AT_RECORDING: lambda recording, label: (
-        f"find out what happened in {recording}, which alone shows {label}, or leave it out of the set"
+        f"Find out what happened in {recording}, which alone shows {label}, or leave it out of the set."
     ),
     Kind.LOOK_AT_SITE: lambda recording, share: (
-        f"check the site of {recording}: the scale factors of its three accelerometers differ alike, by {share}, as "
-        "gravity at another latitude or height makes them"
+        f"Check the site of {recording}: the scale factors of its three accelerometers differ alike, by {share}, as "
+        "gravity at another latitude or height makes them."
     ),
     Kind.RECORD_A_THIRD: lambda label, one, other: (
-        f"record once more: a third recording tells which of {one} and {other} changed ({label})"
+        f"Record once more: a third recording tells which of {one} and {other} changed ({label})."
     ),
     Kind.NO_PLAN_TELLS: lambda label, other: (
-        f"no plan tells {label} from {other}: record at another temperature, or after another warm-up"
+        f"No plan tells {label} from {other}: record at another temperature, or after another warm-up."
     ),
     Kind.RECORD_ONCE_MORE: lambda label, others, turns: (
-        f"to tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}; for a "
+        f"To tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}; for a "
         "whole plan"
     ),
     Kind.NO_TURN_TELLS: lambda label, others, best, tells: (
-        f"no single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
+        f"No single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
         "are needed): search a whole plan for the next recording"
     ),
     Kind.ONE_BY_ONE: lambda: (
-        "diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first"
+        "Diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first."
     ),
     Kind.FIND_EFFECT: lambda: "Find which effect is missing",
     Kind.FIND_SMALLER: lambda: "Find out whether smaller effects are missing",
