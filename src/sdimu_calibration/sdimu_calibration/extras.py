@@ -34,13 +34,7 @@ def lacking(error: ImportError) -> ExtraError | None:
 
 
 def needed(module: str) -> Any:
-    """Import a module of a package that comes with an extra.
-
-    Raises
-    ------
-    ExtraError
-        When the package is not installed.
-    """
+    """Import a module of a package that comes with an extra. Raises ExtraError when the package is not installed."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:

@@ -32,10 +32,7 @@ def ending_at_once() -> Iterator[None]:
 def run_node_program(module: str) -> None:
     """Load the module of a node and run it: until it takes over SIGINT and SIGTERM, they end it with status 0.
 
-    Parameters
-    ----------
-    module : str
-        With a function ``main``, which takes over both signals (`nodes.stopping`).
+    `module`: with a function ``main``, which takes over both signals (`nodes.stopping`).
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os._exit(0))

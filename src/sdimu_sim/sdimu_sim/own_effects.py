@@ -19,10 +19,7 @@ from sdimu_sim.core.hidden import canonical, parse_effects
 def simulated_effects(texts: Iterable[str]) -> tuple[str, ...]:
     """Effects as the simulator takes them: canonical, files put in as equations that name their coefficient.
 
-    Parameters
-    ----------
-    texts : iterable of str
-        Keys with sizes. An effect file with one parameter is named by its path, else ``PATH:PARAMETER``.
+    `texts`: keys with sizes. An effect file with one parameter is named by its path, else ``PATH:PARAMETER``.
     """
     out = tuple(text for given in texts for text in _written(given))
     parse_effects(out)

@@ -55,11 +55,8 @@ class _TemperatureFile(Schema):
 def load_temperature(text: str | Path) -> TemperatureProfile:
     """Read a temperature profile.
 
-    Parameters
-    ----------
-    text : str or Path
-        Name in config/temperature/, path, or the temperature of a soak with its unit, such as ``-20 degC``: its
-        coefficients are stated at `ROOM_DEGC`.
+    `text`: name in config/temperature/, path, or the temperature of a soak with its unit, such as ``-20 degC``: its
+    coefficients are stated at `ROOM_DEGC`.
     """
     if _NUMBER.fullmatch(str(text)):
         try:

@@ -26,10 +26,7 @@ def write_truth(path: Path, truth: Truth) -> None:
     from which it was made, all SI. The size of every named hidden effect is listed with the coefficients, so that
     an estimate finds its truth by name.
 
-    Raises
-    ------
-    OSError
-        When the file cannot be written.
+    Raises OSError when the file cannot be written.
     """
     imu = truth.imu
     content: dict[str, Any] = {
@@ -71,12 +68,7 @@ def check_truth_room(path: Path, bag: Path, replace: bool) -> None:
 
     The truth of a bag that is gone, in its usual place, may always go too.
 
-    Parameters
-    ----------
-    path, bag : Path
-        Of the truth, and of the bag that is made.
-    replace : bool
-        What is there may be replaced.
+    `path`, `bag`: of the truth, and of the bag that is made; `replace`: what is there may be replaced.
     """
     if same_file(path, bag):
         raise DataError(f"{path}: is a folder; name a file with --truth")

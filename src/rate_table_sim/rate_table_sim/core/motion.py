@@ -41,13 +41,7 @@ class TableMotion:
 
 
 def table_motion(plan: Plan, table: TableSpecification, seed: int = 0) -> TableMotion:
-    """Carry out a plan.
-
-    Parameters
-    ----------
-    seed : int
-        Of the encoder noise; nothing else is random.
-    """
+    """Carry out a plan. `seed`: of the encoder noise; nothing else is random."""
     if table.axes is None:
         columns = tuple((AXES.index(turn.axis), 1.0) for turn in plan.turns)
     else:

@@ -57,12 +57,7 @@ def trapezoid(turn: Turn, acceleration_rad_s2: float, sample_rate_hz: float, num
     ``A = w_p (T - t_r)``, ``w_p = a t_r``: the smaller root t_r, then rounded up to the grid, which lowers the
     acceleration and keeps T.
 
-    Parameters
-    ----------
-    acceleration_rad_s2 : float
-        Limit.
-    number : int
-        Of the turn in the plan, from 1, for the error message.
+    `acceleration_rad_s2`: limit; `number`: of the turn in the plan, from 1, for the error message.
     """
     size = abs(turn.angle_rad)
     samples = round(size / turn.rate_rad_s * sample_rate_hz)

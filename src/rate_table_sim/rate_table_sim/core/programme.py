@@ -121,13 +121,7 @@ class GoalProgramme:
         return self._time(self._sent + count - 1)
 
     def take(self, goal: Goal) -> Goal | None:
-        """Accept a goal: it begins at the next sample, or at its own time.
-
-        Returns
-        -------
-        Goal or None
-            The goal that it replaces.
-        """
+        """Accept a goal: it begins at the next sample, or at its own time. Gives the goal that it replaces."""
         if self.halted == "stopped":
             raise DataError("the table was stopped: call the service resume first")
         if self.over:

@@ -41,10 +41,7 @@ def say(console: Console, text: str) -> None:
 def pair(console: Console, name: str, text: str, width: int) -> None:
     """Print a name and what is said of it, below the names and texts of other pairs.
 
-    Parameters
-    ----------
-    width : int
-        Characters of the longest name.
+    `width`: characters of the longest name.
     """
     before = f"  {one_line(name, None):{width}}  "
     line = before + one_line(text, None)

@@ -143,10 +143,7 @@ CANDIDATE_HEADINGS = ("effect", "estimate", "+-", "unit", "probability", "z")
 def candidate_rows(f: Found, told: Probabilities | None) -> list[list[str]]:
     """Rows of an effect that was found, and of what it may be instead: each with the probability that it is this one.
 
-    Parameters
-    ----------
-    told : Probabilities or None
-        Where the sizes stand of what it may be instead.
+    `told`: where the sizes stand of what it may be instead.
     """
     own = f.candidate.coefficient
     shares = {share.name: share.probability for share in f.may_be}

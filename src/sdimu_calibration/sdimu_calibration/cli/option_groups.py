@@ -12,10 +12,7 @@ from typing import Any, get_type_hints
 def with_options(verb: Callable[..., None]) -> Callable[..., None]:
     """Show typer the fields of the groups that a verb takes as options of its own; callers name them likewise.
 
-    Parameters
-    ----------
-    verb : callable
-        Each of its parameters is an argument or option as usual, or of a dataclass whose fields are options.
+    `verb`: each of its parameters is an argument or option as usual, or of a dataclass whose fields are options.
     """
     kinds = get_type_hints(verb, include_extras=True)
     groups: dict[str, Any] = {name: kind for name, kind in kinds.items() if is_dataclass(kind)}
@@ -51,15 +48,7 @@ def _options(group: type) -> Iterator[Parameter]:
 def words_by_option(stated: Any, group: Any) -> dict[str, list[str]]:
     """Write what is stated of the options in a group as words of a command; nothing for those left as they are.
 
-    Parameters
-    ----------
-    stated : dataclass
-        The group itself, or one with more options.
-
-    Returns
-    -------
-    dict of str to list of str
-        Words by option, in the order of the group.
+    `stated`: the group itself, or one with more options. Gives words by option, in the order of the group.
     """
     words: dict[str, list[str]] = {}
     for one in fields(group):

@@ -206,10 +206,7 @@ class StatedOpening(Reading, Stated):
     def read(self, handheld: bool | None) -> Opening:
         """Read all of it, so that a wrong option is told before a long recording is read.
 
-        Parameters
-        ----------
-        handheld : bool or None
-            As `FitRequest.handheld`.
+        `handheld`: as `FitRequest.handheld`.
         """
         from sdimu_calibration.storage.files.config import load_site
         from sdimu_calibration.storage.opening import Opening
@@ -285,15 +282,7 @@ class FitRequest(Fitted):
 
 
 def checked_degc(option: str, value: float) -> float:
-    """Refuse what is no temperature.
-
-    Parameters
-    ----------
-    option : str
-        For the message.
-    value : float
-        Degrees Celsius.
-    """
+    """Refuse what is no temperature. `option`: for the message; `value`: degrees Celsius."""
     if not ABSOLUTE_ZERO_DEGC <= value <= _MOST_DEGC:
         raise DataError(f"{option} {value:g}: expected a temperature in degC from {ABSOLUTE_ZERO_DEGC:g}")
     return value

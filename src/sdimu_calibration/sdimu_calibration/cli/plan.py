@@ -382,12 +382,7 @@ def tell_gain(
 ) -> None:
     """Say what the plan tells beyond what is known, beside the plan that the search began with.
 
-    Parameters
-    ----------
-    classes : sequence of sequence of str
-        What is open, by coefficients.
-    sigmas : tuple of Bounds
-        Known, with the start, with the plan that was found.
+    `classes`: what is open, by coefficients; `sigmas`: known, with the start, with the plan that was found.
     """
     from sdimu_calibration.core.effects.selection import resolve
     from sdimu_calibration.core.plan_search import gain

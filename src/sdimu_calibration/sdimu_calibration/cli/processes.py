@@ -220,12 +220,7 @@ class Children:
     def start(self, name: str, module: str, parameters: Mapping[str, Any]) -> None:
         """Start a node.
 
-        Parameters
-        ----------
-        module : str
-            Python module to run.
-        parameters : mapping of str to value
-            ROS parameters; empty lists are left out, ROS cannot type them.
+        `module`: Python module to run. `parameters`: ROS parameters; empty lists are left out, ROS cannot type them.
         """
         given = {key: value for key, value in parameters.items() if value != []}
         # A file, not -p NAME:=VALUE: there "1,2" or "on" would be read as something else than text.

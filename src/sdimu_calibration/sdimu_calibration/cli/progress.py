@@ -16,10 +16,7 @@ _PATIENCE_S = 2.0
 def bar(console: Console) -> Iterator[Callable[[str, float], None]]:
     """Show a bar once two seconds have passed and the work is not done.
 
-    Yields
-    ------
-    callable
-        ``progress(word, fraction)`` with what is being done and the share done (0 to 1).
+    Gives ``progress(word, fraction)`` with what is being done and the share done (0 to 1).
     """
     start = time.monotonic()
     shown = Progress(console=console, transient=True, disable=not console.is_terminal)

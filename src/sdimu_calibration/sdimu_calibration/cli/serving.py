@@ -166,12 +166,7 @@ class LivePage:
 def ended(folder: str, more: str = "") -> End:
     """Say that a test came to its end, where its results are and how its report is shown.
 
-    Parameters
-    ----------
-    folder : str
-        Of the results; empty where nobody knows.
-    more : str
-        What else is to be said, as it follows a semicolon.
+    `folder`: of the results; empty where nobody knows. `more`: what else is to be said, as it follows a semicolon.
     """
     from sdimu_calibration.report.live_page.record import End
 

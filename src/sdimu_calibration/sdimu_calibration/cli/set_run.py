@@ -51,10 +51,7 @@ class SetRequest:
 def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     """Return the only bag; None where several are to be fitted together.
 
-    Raises
-    ------
-    BadParameter
-        When there is no bag, or bags stand beside a set file.
+    Raises BadParameter when there is no bag, or bags stand beside a set file.
     """
     if file is not None and bags:
         raise typer.BadParameter("the file names the bags of its set: leave the bags out", param_hint="--set")
@@ -64,13 +61,7 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
 
 
 def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
-    """Refuse options that are of one recording: those of an opening, and others by name.
-
-    Raises
-    ------
-    BadParameter
-        When one of them is stated.
-    """
+    """Refuse options that are of one recording: those of an opening, and others by name."""
     own = {name: getattr(opening, name) for name in ("whole_turns", "rests", "exclude_stops", "exclude_times")}
     for name, value in (options | own).items():
         if value:

@@ -45,12 +45,8 @@ class Watch:
     def show(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Show where the test is.
 
-        Parameters
-        ----------
-        streaming : bool
-            Samples still come; False while the whole test is calibrated once more.
-        wall_s : float
-            Time since the first sample.
+        `streaming`: samples still come; False while the whole test is calibrated once more. `wall_s`: time since the
+        first sample.
         """
         if self._live:
             self._live.update(self.picture(seen, streaming, wall_s), refresh=True)

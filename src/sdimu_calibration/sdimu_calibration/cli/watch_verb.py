@@ -94,10 +94,7 @@ def _waited(domain: int | None, console: Console, seconds: float) -> bool:
     Where a run of `sdimu` begins on this machine, watching begins anew in the place of this process: ROS reads the
     domain and its settings as it is loaded.
 
-    Raises
-    ------
-    DataError
-        After `seconds` (s), unless they are 0.
+    Raises DataError after `seconds` (s), unless they are 0.
     """
     import os
     import sys
@@ -129,10 +126,7 @@ def _waited(domain: int | None, console: Console, seconds: float) -> bool:
 def opening_words(test: RunningTest | None, domain: int, seconds: float) -> tuple[str, ...]:
     """Say what is watched and until when; where no run is known, what is waited for and how one is started.
 
-    Parameters
-    ----------
-    seconds : float
-        Wall time to watch (s); 0 for no end.
+    `seconds`: wall time to watch (s); 0 for no end.
     """
     end = f"ends after {seconds:g} s" if seconds else "ends with the test, or with Ctrl-C"
     if test is not None:
@@ -174,10 +168,7 @@ class Pace:
 def watched(domain: int | None) -> RunningTest | None:
     """Return the run of `sdimu` on this machine that is meant; None where none is, but perhaps another's test.
 
-    Parameters
-    ----------
-    domain : int, optional
-        As stated.
+    `domain`: as stated.
     """
     from sdimu_calibration.cli.processes import running_tests, stated_domain
     from sdimu_calibration.core.recording import DataError
@@ -244,10 +235,7 @@ class _Watching:
 def _follow(watching: _Watching, domain: int | None, seconds: float) -> bool:
     """Show a test until its end, or for a while; whether it has ended.
 
-    Parameters
-    ----------
-    domain : int or None
-        Held by the run of `sdimu` as long as the test lasts; None for nodes that somebody else started.
+    `domain`: held by the run of `sdimu` as long as the test lasts; None for nodes that somebody else started.
     """
     import time
 

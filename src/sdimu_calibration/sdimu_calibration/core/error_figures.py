@@ -54,10 +54,7 @@ def held_out_ladder(results: Sequence[Calibration]) -> list[float]:
     A handheld fit learns the scatter that its errors are held against, so all of them are held against that of the
     last.
 
-    Parameters
-    ----------
-    results : sequence of Calibration
-        The simplest model first.
+    `results`: the simplest model first.
     """
     if not all(is_handheld(result) for result in results):
         return [held_out(result) for result in results]

@@ -30,10 +30,7 @@ class FitStatistics:
         They are those in the noise that was learned. Those in white noise judge where this noise may be a missing
         effect.
 
-        Parameters
-        ----------
-        may_be_an_effect : bool
-            As `noise_term.may_be_an_effect` says of the noise that was learned.
+        `may_be_an_effect`: as `noise_term.may_be_an_effect` says of the noise that was learned.
         """
         if self.nis_in_noise is None or may_be_an_effect:
             return self.nis_mean, self.held_out_rms

@@ -74,13 +74,7 @@ class Origin:
 
 
 def measured(origin: Origin, recording: Recording, imu: str) -> Origin:
-    """Add what the recording itself says: start, temperature, largest rate.
-
-    Parameters
-    ----------
-    imu : str
-        Name of the specification.
-    """
+    """Add what the recording itself says: start, temperature, largest rate. `imu`: name of the specification."""
     log = recording.temperature
     heat = (math.nan,) * 3 if log is None else (log.value.mean(), log.value.min(), log.value.max())
     mean, low, high = map(float, heat)

@@ -20,10 +20,7 @@ def printable(text: str) -> str:
 def one_line(text: str, longest: int | None = LONGEST_LINE) -> str:
     """Write a text on one line of printable characters.
 
-    Parameters
-    ----------
-    longest : int or None
-        Characters beyond which the middle is left out; None keeps all.
+    `longest`: characters beyond which the middle is left out; None keeps all.
     """
     # A text of megabytes is cut before its characters are looked at.
     if longest is not None and len(text) > 8 * longest:
@@ -37,10 +34,7 @@ def one_line(text: str, longest: int | None = LONGEST_LINE) -> str:
 def counted(number: int, one: str, many: str = "") -> str:
     """Write a number with its word: ``1 gap``, ``2 gaps``.
 
-    Parameters
-    ----------
-    one, many : str
-        What stands behind one, and behind any other number; `one` with an s by default.
+    `one`, `many`: what stands behind one, and behind any other number; `one` with an s by default.
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
 

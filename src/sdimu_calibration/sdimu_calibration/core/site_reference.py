@@ -58,10 +58,7 @@ def relative_line(references: Sequence[Reference]) -> str:
 def found(references: Sequence[Reference], off: Mapping[str, tuple[float, float]]) -> tuple[Reference, ...]:
     """Put in what a fit found.
 
-    Parameters
-    ----------
-    off : mapping of str to (float, float)
-        Told less true, and its sigma (SI), of those that were estimated along, by name.
+    `off`: told less true, and its sigma (SI), of those that were estimated along, by name.
     """
     return tuple(
         replace(r, value=r.told - off[r.name][0], value_sigma=off[r.name][1]) if r.name in off else r

@@ -112,10 +112,7 @@ class ImuSpecification:
     def in_means_over(self, seconds: float) -> ImuSpecification:
         """Return the specification whose white noise gives means over `seconds` their variance, quantisation included.
 
-        Parameters
-        ----------
-        seconds : float
-            Length of the means (s).
+        `seconds`: length of the means (s).
         """
         gyro = np.sqrt(self.gyro_white_noise**2 + 2.0 * self.gyro_quantisation**2 / seconds)
         accel = np.sqrt(self.accel_white_noise**2 + 2.0 * self.accel_quantisation**2 / seconds)

@@ -22,10 +22,7 @@ _said: dict[str, Speaker] = {"option": _plain, "work": _plain}
 def speak(option: Speaker, work: Speaker) -> None:
     """Let a shell say how its users state an option and start a work.
 
-    Parameters
-    ----------
-    option, work : callable
-        Make words of the value of an `Option` and of a `Work`.
+    `option`, `work`: make words of the value of an `Option` and of a `Work`.
     """
     _said.update(option=option, work=work)
 

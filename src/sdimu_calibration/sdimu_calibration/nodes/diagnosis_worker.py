@@ -162,11 +162,8 @@ class Diagnoser:
 def work(pipe: Connection) -> None:
     """Answer requests until the pipe breaks.
 
-    Parameters
-    ----------
-    pipe : Connection
-        Brings a `WorkerSetup`, then each `WorkerRequest`; takes each `Answer`, and where the setup wants it a
-        `Picture`, which need not be waited for.
+    `pipe`: brings a `WorkerSetup`, then each `WorkerRequest`; takes each `Answer`, and where the setup wants it a
+    `Picture`, which need not be waited for.
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

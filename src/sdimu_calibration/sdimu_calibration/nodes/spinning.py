@@ -34,10 +34,7 @@ def run_node(make: Callable[[], Spinnable], args: Sequence[str] | None = None) -
     `EventsExecutor` keeps the order of arrival across topics and costs a fifth of the others per message. Its
     plain ``spin()`` dispatches nothing and looks at no signal, hence the loop.
 
-    Raises
-    ------
-    SystemExit
-        0 when done or stopped by a signal, 1 on unusable data or options (one line on stderr).
+    Raises SystemExit: 0 when done or stopped by a signal, 1 on unusable data or options (one line on stderr).
     """
     watch_signals()
     rclpy.init(args=list(args) if args is not None else None, signal_handler_options=SignalHandlerOptions.NO)

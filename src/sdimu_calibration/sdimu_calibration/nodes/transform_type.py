@@ -86,10 +86,7 @@ class _Hash(Structure):
 def transform_class() -> type:
     """Return the message class of TFMessage: the installed one, else one for raw bytes.
 
-    Raises
-    ------
-    ImportError
-        When there is neither the package nor the libraries to stand in for it.
+    Raises ImportError when there is neither the package nor the libraries to stand in for it.
     """
     try:
         from tf2_msgs.msg import TFMessage  # noqa: PLC0415 (may be missing)

@@ -70,10 +70,7 @@ def sizes(effect: Effect) -> str:
 def page(typeset: bool = False) -> str:
     """Make the page of the catalogue, which the book holds as generated/effects.md.
 
-    Parameters
-    ----------
-    typeset : bool
-        Equations as browsers typeset them, for the book; else as plain text, for any reader of Markdown.
+    `typeset`: equations as browsers typeset them, for the book; else as plain text, for any reader of Markdown.
     """
     parts = [_HEAD]
     for title, effects in grouped():

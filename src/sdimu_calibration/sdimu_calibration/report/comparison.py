@@ -42,10 +42,7 @@ def headings(results: Sequence[Calibration]) -> tuple[str, ...]:
 def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[list[str]]:
     """Rows of `headings`, one a result, each against the one before it.
 
-    Parameters
-    ----------
-    results : sequence of Calibration
-        Of one recording, the simplest model first.
+    `results`: of one recording, the simplest model first.
     """
     if len(results) < 2:
         raise DataError("compare: give at least two results of one recording")

@@ -103,13 +103,8 @@ def ranking(
 ) -> Figure:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches.
 
-    Parameters
-    ----------
-    threshold : float
-        Score that noise reaches.
-    classes : mapping of str to mapping, optional
-        By the label of an effect that was found: what it may be, itself first, each with its probability in words.
-        Those share the bar of the effect.
+    `threshold`: score that noise reaches. `classes`: by the label of an effect that was found: what it may be, itself
+    first, each with its probability in words. Those share the bar of the effect.
     """
     told = classes or {}
     folded = {name for label, shares in told.items() for name in shares if name != label.partition("(")[0]}

@@ -22,10 +22,7 @@ _KEYS = {word.lower(): text for word, text in WORDS.items()}
 def explained(html: str) -> str:
     """Explain each word of the glossary where it stands first; tags and their attributes stay as they are.
 
-    Parameters
-    ----------
-    html : str
-        A part of a page.
+    `html`: a part of a page.
     """
     seen: set[str] = set()
 

@@ -70,13 +70,7 @@ def time_words(test: Outline, seen: Progress) -> str:
 
 
 def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
-    """Say how long a test will take at the pace so far.
-
-    Parameters
-    ----------
-    wall_s : float
-        Wall time since the first sample (s).
-    """
+    """Say how long a test will take at the pace so far. `wall_s`: wall time since the first sample (s)."""
     if not test.duration_s or wall_s < 1.0 or seen.table_s <= 0.0:
         return "time left unknown"
     pace = seen.table_s / wall_s

@@ -53,12 +53,7 @@ def published_rows(
 ) -> list[tuple[str, ...]]:
     """One row an effect: for every column "here (printed)", then the largest deviation in percent, then the unit.
 
-    Parameters
-    ----------
-    found, printed : mapping of column to mapping of effect to float
-        Largest sigma of the axes (SI).
-    units : mapping of str to str
-        Display unit by effect.
+    `found`, `printed`: largest sigma of the axes (SI); `units`: display unit by effect.
     """
     rows = []
     for effect, unit in units.items():
@@ -79,12 +74,7 @@ def write_page(
 ) -> None:
     """Write prediction.html: one file that needs no network.
 
-    Parameters
-    ----------
-    about : mapping
-        Of what: shown in the heading.
-    published : (columns, rows), optional
-        Table beside published values.
+    `about`: of what: shown in the heading; `published`: table beside published values.
     """
     write_whole(path, page(prediction, about, published))
 

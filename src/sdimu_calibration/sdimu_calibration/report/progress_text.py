@@ -29,12 +29,7 @@ def falling(
 ) -> list[Falling]:
     """Sum the sigmas up by effect, those that have fallen least first.
 
-    Parameters
-    ----------
-    first, now : mapping of str to float
-        Sigma (SI) by coefficient at the start and now.
-    units : mapping of str to str
-        Customary unit by coefficient.
+    `first`, `now`: sigma (SI) by coefficient at the start and now; `units`: customary unit by coefficient.
     """
     names = [name for name in now if first.get(name, 0.0) > 0.0]
     out = []
@@ -57,12 +52,8 @@ def _unit(coefficient: str) -> str:
 def light(nis: Mapping[str, float], verdict: str) -> str:
     """Say whether the innovations of a stop are as large as promised, and how large: 1 is right.
 
-    Parameters
-    ----------
-    nis : mapping of str to float
-        Mean squared innovation per degree of freedom at the stop, by channel.
-    verdict : str
-        On the same numbers, as `core.live.stop_verdict` says it.
+    `nis`: mean squared innovation per degree of freedom at the stop, by channel; `verdict`: on the same numbers, as
+    `core.live.stop_verdict` says it.
     """
     if not nis:
         return "innovations: none yet"

@@ -29,10 +29,8 @@ class ReportExtras:
 def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportExtras:
     """Work out what the page of a diagnosis shows in addition.
 
-    Parameters
-    ----------
-    delivered : Fit, optional
-        That was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in its place.
+    `delivered`: the fit that was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in
+    its place.
     """
     rivals = [("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table

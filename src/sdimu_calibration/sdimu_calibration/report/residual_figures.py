@@ -31,10 +31,7 @@ def innovations(found: data.Residuals, two: bool) -> Figure:
     Position and velocity are measured once after each turn; rate and force every second: there the pale line keeps the
     smallest and largest of each stretch, the marks are means over stops.
 
-    Parameters
-    ----------
-    two : bool
-        Draw both the model as given and with what was found.
+    `two`: draw both the model as given and with what was found.
     """
     titles = [name.replace("_", " ") for name in CHANNEL_NAMES]
     figure = Figure(rows=4, cols=3, titles=titles, gap_y=0.075, gap_x=0.085, share_x=True)

@@ -30,12 +30,8 @@ def cluster(scheduler: str | None, workers: int) -> Iterator[Run]:
 
     The result of a call whose worker was lost is the text of the error.
 
-    Parameters
-    ----------
-    scheduler : str or None
-        Address of a dask scheduler; None starts processes on this machine, which end with the context.
-    workers : int
-        Number of local processes.
+    `scheduler`: address of a dask scheduler; None starts processes on this machine, which end with the context.
+    `workers`: number of local processes.
     """
     with _client(scheduler, workers) as client:
 

@@ -34,10 +34,7 @@ LONGEST = 1 << 28
 def write_report(path: Path, report: Report, number: str) -> None:
     """Write a report of a job beside its place and rename it; the folder is made too.
 
-    Parameters
-    ----------
-    number : str
-        Of the job that it answers.
+    `number`: of the job that it answers.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,10 +13,7 @@ _WATCHED_S = 0.5
 def end_with(parent: int) -> None:
     """Let this process end when its parent has ended: nobody takes what it works on.
 
-    Parameters
-    ----------
-    parent : int
-        Number of the process that started this one.
+    `parent`: number of the process that started this one.
     """
 
     def watch() -> None:

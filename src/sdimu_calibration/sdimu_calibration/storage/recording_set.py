@@ -104,12 +104,8 @@ class _SetFile(Schema):
 def load_set(path: Path, like: BagSource) -> RecordingSet:
     """Read a set.
 
-    Parameters
-    ----------
-    path : Path
-        Bags are named from its folder.
-    like : BagSource
-        What the user states for all recordings; the file's own site and IMU come before it.
+    `path`: bags are named from its folder. `like`: what the user states for all recordings; the file's own site and IMU
+    come before it.
     """
     path = Path(path)
     file = read_yaml(path, _SetFile)
@@ -134,10 +130,7 @@ def load_set(path: Path, like: BagSource) -> RecordingSet:
 def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
     """Make a set of bags; power-on and serial are those that the bags say.
 
-    Parameters
-    ----------
-    like : BagSource
-        What the user states for all of them.
+    `like`: what the user states for all of them.
     """
     names = [bag.resolve().name for bag in bags]
     unique = len(set(names)) == len(names)
@@ -250,12 +243,7 @@ _UNSAID = Said()
 def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID, *, replace: bool = False) -> None:
     """Write a first set file of bags, with what they or the user say of unit and power-on, for the user to complete.
 
-    Parameters
-    ----------
-    path : Path
-        File to make; bags are named from its folder.
-    replace : bool
-        A file that is there may go.
+    `path`: file to make; bags are named from its folder. `replace`: a file that is there may go.
     """
     path = Path(path)
     check_file_room(path, "--out", replace=replace, sources=bags)

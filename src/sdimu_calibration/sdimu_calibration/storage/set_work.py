@@ -169,10 +169,7 @@ def _parts(places: Sequence[int]) -> list[Sequence[int]]:
 def job_number(job: Job) -> str:
     """Give a job a number: another one for other bytes of the bag, another question or another program.
 
-    Returns
-    -------
-    str
-        Empty for a job with effects that have no name.
+    Empty for a job with effects that have no name.
     """
     source = job.member.open
     effects = (*job.model.effects, *job.candidates)

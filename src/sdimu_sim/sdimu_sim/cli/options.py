@@ -46,15 +46,7 @@ class World:
         return tuple(simulated_effects(self.effect or ()))
 
     def scenario(self, plan: str, imu: str, **drawn: Any) -> Scenario:
-        """Read all of it for the simulator.
-
-        Parameters
-        ----------
-        plan, imu : str
-            Names or paths.
-        **drawn
-            What else the scenario takes.
-        """
+        """Read all of it for the simulator. `plan`, `imu`: names or paths; `**drawn`: what else the scenario takes."""
         from rate_table_sim.table_file import load_table
         from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
         from sdimu_sim.core.scenario import Scenario

@@ -391,10 +391,7 @@ def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisS
 def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:
     """Leave the plan that was run, to which the advice of the diagnosis refers; chosen turns as the motion showed them.
 
-    Parameters
-    ----------
-    part : Path
-        Where files are written that then go to `out` together.
+    `part`: where files are written that then go to `out` together.
     """
     from sdimu_calibration.storage.files.config import load_plan
     from sdimu_calibration.storage.files.plan_file import write_plan

@@ -58,12 +58,8 @@ class Expression:
 def parse_expression(text: str, known: Collection[str]) -> Expression:
     """Read a formula.
 
-    Parameters
-    ----------
-    text : str
-        Numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max.
-    known : collection of str
-        Names that may be used.
+    `text`: numbers, the `known` names, ``+ - * / **`` and sin, cos, tan, exp, log, abs, sign, sqrt, tanh, min, max;
+    `known`: names that may be used.
     """
     if len(text) > _LONGEST:
         raise DataError(f"expression is longer than {_LONGEST} characters")

@@ -226,12 +226,7 @@ def simulate_imu(
 ) -> ImuSamples:
     """Make all samples of a test.
 
-    Parameters
-    ----------
-    motion : PlatformMotion
-        From t = 0; before that the platform rests.
-    rate_hz : float
-        Sample k = 1, 2, ... ends at k / rate.
+    `motion`: from t = 0; before that the platform rests. `rate_hz`: sample k = 1, 2, ... ends at k / rate.
     """
     generator = ImuGenerator(truth, site, rate_hz, seed, temperature)
     parts = [

@@ -336,10 +336,7 @@ def canonical(text: str) -> str:
 def parse_effects(texts: Iterable[str]) -> Hidden:
     """Read hidden effects.
 
-    Parameters
-    ----------
-    texts : iterable of str
-        Canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
+    `texts`: canonical keys with a size; files of effects of one's own are put in before (`sdimu_sim.own_effects`).
     """
     found = _Found()
     for text in texts:

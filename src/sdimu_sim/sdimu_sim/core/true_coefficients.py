@@ -68,10 +68,7 @@ def one_coefficient(names: Iterable[str]) -> list[tuple[str, str]]:
 
     A test shows their sum, which is the true value under either name.
 
-    Returns
-    -------
-    list of (str, str)
-        The g-sensitivity and the mass unbalance of each such pair.
+    Gives the g-sensitivity and the mass unbalance of each such pair.
     """
     return [(_TWINS[name], name) for name in _TWINS if _TWINS[name] in set(names)]
 

@@ -111,12 +111,8 @@ def draw_coefficients(imu: ImuSpecification, seed: int) -> dict[str, float]:
 def turned_on(coefficients: Mapping[str, float], sigma: Mapping[str, float], seed: int) -> dict[str, float]:
     """Draw how coefficients of a unit differ in one power-on.
 
-    Parameters
-    ----------
-    coefficients : mapping of str to float
-        Of the unit (SI).
-    sigma : mapping of str to float
-        By group, such as ``gyro_bias``, how far each of its coefficients differs (SI).
+    `coefficients`: of the unit (SI); `sigma`: by group, such as ``gyro_bias``, how far each of its coefficients differs
+    (SI).
     """
     out = dict(coefficients)
     for group, size in sigma.items():

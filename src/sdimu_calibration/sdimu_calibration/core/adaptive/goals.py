@@ -53,13 +53,7 @@ class Goals:
 
 
 def aimed(goals: Goals, tell: Sequence[str]) -> Goals:
-    """Let goals ask to tell coefficients apart, too; by none they stay as they are.
-
-    Parameters
-    ----------
-    tell : sequence of str
-        As of `Goals`.
-    """
+    """Let goals ask to tell coefficients apart, too; by none they stay as they are. `tell`: as of `Goals`."""
     if tell:
         named_class(tell)
     return replace(goals, tell=tuple(tell))

@@ -60,13 +60,7 @@ class Knowledge:
 
 
 def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
-    """Take from a diagnosis what the choice of the next move needs.
-
-    Parameters
-    ----------
-    found : Diagnosis
-        Of what was recorded so far.
-    """
+    """Take from a diagnosis what the choice of the next move needs. `found`: of what was recorded so far."""
     alike, sizes, needed, place = _class(found)
     named = tuple(c.label for c in found.chosen)
     known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
@@ -117,10 +111,7 @@ def _to_tell(fit: Fit, goals: Goals) -> tuple[Effect, ...]:
 def _aim(at: SoFar, goals: Goals) -> OpenClass | None:
     """Class that the goals ask to tell apart: the first from all others, each of the size that physics gives it.
 
-    Returns
-    -------
-    OpenClass or None
-        None where that would be told by now.
+    None where that would be told by now.
     """
     if not goals.tell:
         return None
@@ -171,10 +162,7 @@ def nearest_other(found: Diagnosis) -> float | None:
 
     Time constants of the same effect are no other one.
 
-    Returns
-    -------
-    float or None
-        None where nothing was found, or nothing else can be seen.
+    None where nothing was found, or nothing else can be seen.
     """
     chosen = found.found.chosen.tolist()
     if not chosen:

@@ -63,10 +63,7 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:
 
     The search for effects is made when something stands out, and before the test ends.
 
-    Parameters
-    ----------
-    fit : Fit
-        Of what was recorded so far.
+    `fit`: of what was recorded so far.
     """
     left = about.goals.minutes - about.elapsed_s / 60.0
     searched = diagnosis.verdict != Verdict.CONSISTENT

@@ -112,13 +112,7 @@ class Compensated:
 
 
 def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effect, ...]:
-    """Effects of a result, in its order.
-
-    Parameters
-    ----------
-    own : sequence of Effect
-        Effects that are in no catalogue, such as those read from files.
-    """
+    """Effects of a result, in its order. `own`: effects that are in no catalogue, such as those read from files."""
     given = {effect.key: effect for effect in own}
     try:
         effects = imu_model.told_apart(

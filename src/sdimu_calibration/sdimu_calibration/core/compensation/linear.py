@@ -89,10 +89,7 @@ class LinearModel(Part):
     def at(self, degc: float) -> LinearModel:
         """State the same sensors from another temperature: ``(x + step)^n`` in powers of x.
 
-        Parameters
-        ----------
-        degc : float
-            The new T0 (deg C).
+        `degc`: the new T0 (deg C).
         """
         if not self.parts:
             return self
@@ -123,10 +120,7 @@ def _ascending(sums: Mapping[Factor, Part]) -> dict[Factor, Part]:
 def linear_model(calibration: Calibration, own: Sequence[Effect] = ()) -> LinearModel:
     """Collect every coefficient whose effect is affine in rate and force, at each temperature.
 
-    Parameters
-    ----------
-    own : sequence of Effect
-        Effects of the result that are in no catalogue.
+    `own`: effects of the result that are in no catalogue.
     """
     sums = {_CONSTANT: Part(np.eye(6), np.zeros(6))}
     left: list[str] = []

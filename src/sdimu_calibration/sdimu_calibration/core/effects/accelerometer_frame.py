@@ -131,10 +131,7 @@ def accelerometer_frame_model(
 ) -> AccelerometerFrameModel | None:
     """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it.
 
-    Parameters
-    ----------
-    more : sequence of Effect
-        What the estimator estimates along, behind all others, and does not report.
+    `more`: what the estimator estimates along, behind all others, and does not report.
     """
     pinned = set(body_frame.pinned_names())
     if not pinned <= set(asked.names):

@@ -70,10 +70,7 @@ def of_any_direction(sensors: ImuModel, latitude: float) -> ImuModel:
 def with_any_direction(sensors: ImuModel, latitude: float) -> ImuModel:
     """Put a horizontal Earth rate of any direction behind a model, as two parameters that serve.
 
-    Parameters
-    ----------
-    latitude : float
-        Of the site (rad).
+    `latitude`: of the site (rad).
     """
     effect = horizontal_earth_rate(latitude)
     sigmas, none = np.full(2, horizontal(latitude) / float(np.sqrt(2.0))), np.zeros(2)

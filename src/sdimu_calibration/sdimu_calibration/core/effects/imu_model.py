@@ -202,10 +202,8 @@ def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
 def with_references(sensors: ImuModel, references: Sequence[tuple[Effect, float]]) -> ImuModel:
     """Put what the test believes of its site behind the coefficients, as parameters that serve.
 
-    Parameters
-    ----------
-    references : sequence of (Effect, float)
-        Of one parameter each, with the sigma that is stated of it (SI); those that the model has are passed over.
+    `references`: of one parameter each, with the sigma that is stated of it (SI); those that the model has are passed
+    over.
     """
     new = [(effect, sigma) for effect, sigma in references if effect.parameters[0].name not in sensors.names]
     if not new:

@@ -12,13 +12,7 @@ _EFFECTS: dict[str, Effect] = {}
 
 
 def register(effect: Effect) -> Effect:
-    """Add an effect.
-
-    Raises
-    ------
-    ValueError
-        When its name, or one of its parameters' names, is taken.
-    """
+    """Add an effect. Raises ValueError when its name, or one of its parameters' names, is taken."""
     if effect.name in _EFFECTS:
         raise ValueError(f"effect '{effect.name}' is registered twice")
     taken = {p.name for e in _EFFECTS.values() for p in e.parameters}

@@ -48,10 +48,7 @@ class ChosenRests:
 def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None, excluded: Spans = ()) -> ChosenRests:
     """Find the rests with which the coefficients are known best.
 
-    Parameters
-    ----------
-    excluded : sequence of (float, float)
-        Spans of time (s) of which no rest takes anything.
+    `excluded`: spans of time (s) of which no rest takes anything.
     """
     sets = tuple(without_spans(recording, rests, excluded) for rests in relaxed(recording))
     runs = [ChosenRests(rests, reduce_run(recording, rests)) for rests in sets]

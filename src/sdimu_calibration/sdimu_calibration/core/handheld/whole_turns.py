@@ -50,13 +50,7 @@ def whole_turns(run: HandheldRun) -> Ints:
 
 
 def with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
-    """Return a run whose whole turns are known to be such.
-
-    Parameters
-    ----------
-    sigma : float
-        How well the IMU was put back (rad, one sigma).
-    """
+    """Return a run whose whole turns are known to be such. `sigma`: how well the IMU was put back (rad, one sigma)."""
     found = whole_turns(run)
     if not len(found):
         raise DataError(

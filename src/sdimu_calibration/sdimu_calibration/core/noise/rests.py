@@ -31,10 +31,7 @@ def rests(recording: Recording) -> tuple[slice, ...]:
     A sample is at rest when the second about it scatters no more than the quietest do, its mean rate is theirs, no
     sample is missing, and the table (where it says anything) dwells. A second at both ends of each rest is left out.
 
-    Returns
-    -------
-    tuple of slice
-        Rows of the recording, in order.
+    Gives rows of the recording, in order.
     """
     size = _window(recording)
     first, last = runs(at_rest(recording))

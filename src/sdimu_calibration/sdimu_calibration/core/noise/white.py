@@ -41,13 +41,7 @@ class WhiteNoise:
 
 
 def white_noise(recording: Recording, rows: Sequence[slice] | None = None) -> WhiteNoise:
-    """Measure the white noise in rests of a recording.
-
-    Parameters
-    ----------
-    rows : sequence of slice, optional
-        The rests; all that `rests` finds by default.
-    """
+    """Measure the white noise in rests of a recording. `rows`: the rests; all that `rests` finds by default."""
     rows = rests(recording) if rows is None else rows
     interval = recording.interval_s
     densities, freedom = [], 1.0

@@ -113,13 +113,7 @@ def next_turn(
 
 
 def named_class(alike: Sequence[str | Effect]) -> tuple[list[Effect], tuple[str, ...]]:
-    """Find the effects that are to be told apart, and the names of their coefficients.
-
-    Parameters
-    ----------
-    alike : sequence of str or Effect
-        As for `next_turn`.
-    """
+    """Find the effects that are to be told apart, and the names of their coefficients. `alike`: as for `next_turn`."""
     effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
     names = tuple(p.name for e in effects for p in e.parameters)
     if len(names) < 2:
@@ -176,10 +170,7 @@ def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None)
 def in_sigmas(*values: float) -> list[str]:
     """Write significances in as many digits as show that they differ; in one where three do not.
 
-    Parameters
-    ----------
-    *values : float
-        In sigmas (1).
+    `*values`: in sigmas (1).
     """
     for digits in (1, 2, 3):
         out = [f"{value:.{digits}f}" for value in values]

@@ -136,13 +136,7 @@ def is_possible(table: RateTable, angles: Floats, *steps: Step) -> bool:
 
 
 def steps_of(plan: Plan) -> tuple[Step, ...]:
-    """Take a plan apart into steps: the first only dwells.
-
-    Returns
-    -------
-    tuple of Step
-        One more than the plan has turns.
-    """
+    """Take a plan apart into steps: the first only dwells. Gives one more than the plan has turns."""
     turns: tuple[Turn | None, ...] = (None, *plan.turns)
     return tuple(Step(turn, dwell, plan.acceleration_rad_s2) for turn, dwell in zip(turns, plan.dwell_s, strict=True))
 

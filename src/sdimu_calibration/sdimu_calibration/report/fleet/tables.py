@@ -21,10 +21,7 @@ _ALIKE = 4
 def rows(done: Study, units: Mapping[str, str]) -> list[list[str]]:
     """One row of `HEADINGS` a coefficient; numbers in its customary unit.
 
-    Parameters
-    ----------
-    units : mapping of str to str
-        Customary unit of each coefficient.
+    `units`: customary unit of each coefficient.
     """
     out: dict[str, list[str]] = {}
     for one in done.people.out:

@@ -32,10 +32,7 @@ _RUN, _LOOK = "run", "look"
 def build(record: LiveRecord, host: str = LOOPBACK[0], visitors: Visitors | None = None) -> Dash:
     """Make the application of a record, to be served at an address of this machine.
 
-    Parameters
-    ----------
-    visitors : Visitors, optional
-        Where pages are noted.
+    `visitors`: where pages are noted.
     """
     app = application("sdimu live", host, view.STYLE, view.SCRIPT)
     app.layout = lambda: view.layout(record.folder)

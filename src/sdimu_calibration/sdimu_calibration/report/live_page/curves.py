@@ -29,13 +29,7 @@ class Curves:
         self._step = 0.0
 
     def add(self, t: float, values: Mapping[str, float]) -> bool:
-        """Add a point; whether there is anything new.
-
-        Parameters
-        ----------
-        t : float
-            Time of the test (s).
-        """
+        """Add a point; whether there is anything new. `t`: time of the test (s)."""
         last = self._points[-1][0] if self._points else -1.0
         if t < last - _AGAIN_S:
             self._points, self._step, last = [], 0.0, -1.0

@@ -49,12 +49,7 @@ _SENSORS = ("gyro", "accel")
 def sigmas(curves: Drawn, fallen: Sequence[Falling]) -> Figure:
     """Draw what is left of the sigmas of each effect, over the test, on a logarithmic scale.
 
-    Parameters
-    ----------
-    curves : Drawn
-        Share of the sigma at the start, by effect.
-    fallen : sequence of Falling
-        The same now, with the sizes that the legend tells.
+    `curves`: share of the sigma at the start, by effect; `fallen`: the same now, with the sizes that the legend tells.
     """
     now = {f.effect: f" {short(f.sigma)} {f.unit}" for f in fallen}
     minutes = [round(t / 60.0, _DIGITS) for t in curves.t]
@@ -188,10 +183,7 @@ def _laid_out(figure: Figure, height: int, **more: Any) -> Figure:
 def finished(figure: Figure, look: Any) -> Any:
     """Make a figure for the page: in its theme, and all of it larger on a screen of many pixels.
 
-    Parameters
-    ----------
-    look : mapping
-        ``theme``, and ``scale`` of what is written.
+    `look`: ``theme``, and ``scale`` of what is written.
     """
     scale = float(look.get("scale", 1.0))
     if scale != 1.0:

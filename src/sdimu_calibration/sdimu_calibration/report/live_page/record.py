@@ -98,12 +98,8 @@ class LiveRecord:
     def take(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Take what is seen now.
 
-        Parameters
-        ----------
-        streaming : bool
-            Samples still come; False while the whole test is calibrated once more.
-        wall_s : float
-            Wall time that the test has taken so far (s).
+        `streaming`: samples still come; False while the whole test is calibrated once more. `wall_s`: wall time that
+        the test has taken so far (s).
         """
         fallen = tuple(falling(seen.first, seen.sigmas, self._test.units, self._test.effects))
         head = self._where(seen, streaming, wall_s)
@@ -172,10 +168,7 @@ class LiveRecord:
     def carry_out(self, add: Callable[[list[str]], str]) -> None:
         """Let a test take the effects that pages asked for, and keep its answer.
 
-        Parameters
-        ----------
-        add : callable
-            Takes effects, and returns why they were not added; empty when they were.
+        `add`: takes effects, and returns why they were not added; empty when they were.
         """
         while (effect := self._next_asked()) is not None:
             why = add([effect])

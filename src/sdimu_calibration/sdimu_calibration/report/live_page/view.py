@@ -19,13 +19,7 @@ EVERY_MS = 1000
 
 
 def layout(folder: str) -> Any:
-    """Lay a fresh page out.
-
-    Parameters
-    ----------
-    folder : str
-        Of the results; empty where nobody knows.
-    """
+    """Lay a fresh page out. `folder`: of the results; empty where nobody knows."""
     where = f" The results are in {folder}." if folder else ""
     return html.Div(
         [

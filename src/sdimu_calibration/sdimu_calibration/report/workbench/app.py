@@ -39,10 +39,7 @@ Judge = Callable[[Sequence[str], Callable[[str, float], None]], SetDiagnosis]
 def build(shelf: RecordingCache, host: str = LOOPBACK[0], judge: Judge | None = None) -> Dash:
     """Make the application of a shelf of recordings, to be served at an address of this machine.
 
-    Parameters
-    ----------
-    judge : callable, optional
-        Diagnoses all recordings of the shelf as one set, with some effects added.
+    `judge`: diagnoses all recordings of the shelf as one set, with some effects added.
     """
     app = application("sdimu workbench", host, view.STYLE, view.SCRIPT)
     app.layout = lambda: view.layout("Workbench", judge is not None)

@@ -66,12 +66,7 @@ def _in_si(prior: StatedPrior) -> dict[str, str]:
 def command(setting: Setting, bag: str, options: Sequence[str] = ()) -> str:
     """Command that gives the same numbers, for the folder in which the archive is unpacked.
 
-    Parameters
-    ----------
-    bag : str
-        Place or name of the recording.
-    options : sequence of str
-        Words that say how it is opened.
+    `bag`: place or name of the recording; `options`: words that say how it is opened.
     """
     out = ["sdimu", "calibrate", quoted(bag), "--model", "model.yaml", *map(quoted, options)]
     if setting.held:

@@ -29,10 +29,7 @@ _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 def heat_map(grid: data.Grid, cell: tuple[int, int], most: int = _MOST_NUMBERED) -> Figure:
     """Heat map of the report with a frame around the cell that is looked at.
 
-    Parameters
-    ----------
-    most : int
-        Number of stops whose numbers stand beside each other.
+    `most`: number of stops whose numbers stand beside each other.
     """
     figure = evidence_figures.heat_map(grid)
     row, column = cell[0], int(np.searchsorted(grid.stops, cell[1]))
@@ -88,12 +85,7 @@ def residuals(fitted: Fitted, curve: Curve, channel: int, stop: int | None, agai
 
     They are those of the final coefficients; the heat map has those that the filter met on its way, which knew less.
 
-    Parameters
-    ----------
-    stop : int or None
-        None shows all stops.
-    against : str
-        One of `fitted.axes`.
+    `stop`: None shows all stops; `against`: one of `fitted.axes`.
     """
     rows = np.ones(len(fitted.residuals.t), dtype=bool) if stop is None else fitted.residuals.stop == stop
     x, y, out = fitted.axes[against], curve.y[:, channel], fitted.left_out[:, channel]
@@ -202,10 +194,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
 def finished(figure: Figure, look: Any) -> Any:
     """Make a figure for the page: in its theme, and larger where it would be too small to read.
 
-    Parameters
-    ----------
-    look : mapping
-        ``theme``, and ``scale`` of what is written.
+    `look`: ``theme``, and ``scale`` of what is written.
     """
     made, scale = figure.as_plotly(str(look.get("theme", "light"))), float(look.get("scale", 1.0))
     if scale == 1.0:

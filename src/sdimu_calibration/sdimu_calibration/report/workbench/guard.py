@@ -32,10 +32,7 @@ plotly need scripts in the page, and make some while they run."""
 def guard(server: Flask, host: str) -> None:
     """Answer only what is asked of this machine, by name, and what can be understood.
 
-    Parameters
-    ----------
-    host : str
-        Address that is listened on; another one than loopback is answered too, with the names of this machine.
+    `host`: address that is listened on; another one than loopback is answered too, with the names of this machine.
     """
     names = {*LOOPBACK, *(() if host in LOOPBACK else _own_names(host))}
     server.config["MAX_CONTENT_LENGTH"] = server.config["MAX_FORM_MEMORY_SIZE"] = LARGEST

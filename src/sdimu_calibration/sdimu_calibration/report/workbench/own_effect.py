@@ -28,10 +28,7 @@ def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> 
 def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tuple[StatedPrior, ...]:
     """Put the priors of a page over those of the model that it started from.
 
-    Parameters
-    ----------
-    changed : sequence of (str, str, str)
-        Coefficient, mean and sigma as a page holds them.
+    `changed`: coefficient, mean and sigma as a page holds them.
     """
     names = {name for name, _, _ in changed}
     return (*(one for one in given if one.name not in names), *(_stated(*one) for one in changed))

@@ -18,12 +18,7 @@ _INSIDE_S = 1e-3
 def step(now: State, what: str, controls: Controls) -> State:
     """Return the state that a click asks for; the same one when it asks for nothing.
 
-    Parameters
-    ----------
-    what : str
-        What was clicked: one of `STEPS`.
-    controls : mapping
-        Values of the controls of the page by their names.
+    `what`: what was clicked: one of `STEPS`; `controls`: values of the controls of the page by their names.
     """
     return STEPS[what](now, controls) if what in STEPS else now
 

@@ -44,13 +44,7 @@ _KEYS = (
 
 
 def layout(title: str, together: bool = False) -> Any:
-    """Lay a fresh page out.
-
-    Parameters
-    ----------
-    together : bool
-        They can be judged as one set.
-    """
+    """Lay a fresh page out. `together`: they can be judged as one set."""
     return html.Div(
         [
             dcc.Store(id="state", storage_type="session"),

@@ -23,10 +23,7 @@ def check_regular(path: Path) -> None:
 def read_bounded(path: Path, longest: int) -> bytes:
     """Read a regular file of `longest` bytes at most.
 
-    Raises
-    ------
-    DataError
-        Where there is none, it cannot be read, or it is longer.
+    Raises DataError where there is none, it cannot be read, or it is longer.
     """
     path = Path(path)
     check_regular(path)

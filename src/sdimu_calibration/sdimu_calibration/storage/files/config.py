@@ -166,13 +166,9 @@ def config_folder() -> Path:
 def find_config(kind: str, name_or_path: str | Path) -> Path:
     """Path of a configuration file.
 
-    Parameters
-    ----------
-    kind : str
-        Folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
-    name_or_path : str or Path
-        A bare name is looked up in the config folder, then among the files of the working directory; whatever looks
-        like a path is taken as it is.
+    `kind`: folder inside the config folder: ``plan``, ``imu``, ``model``, ``site``, ``table``, ``temperature``.
+    `name_or_path`: a bare name is looked up in the config folder, then among the files of the working directory;
+    whatever looks like a path is taken as it is.
     """
     text = str(name_or_path)
     path = Path(text)

@@ -64,12 +64,7 @@ class DatasheetFile(ResultModel):
 def write_datasheet(path: Path, lines: Sequence[sheet.Line], about: Certificate, entries: Sequence[Entry]) -> None:
     """Write datasheet.json: SI numbers, ``null`` for what was not measured.
 
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    entries : sequence of Entry
-        The results that it is made of.
+    `entries`: the results that it is made of.
     """
     DatasheetFile.model_construct(
         format=FORMAT,
@@ -83,12 +78,8 @@ def write_datasheet(path: Path, lines: Sequence[sheet.Line], about: Certificate,
 def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, str], ...]:
     """Hash the files of the recordings of some results.
 
-    Parameters
-    ----------
-    entries : sequence of Entry
-        A recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it.
-    given : sequence of Path
-        Recordings that are elsewhere.
+    `entries`: a recording is looked for beside the folder of its result, where `sdimu calibrate` leaves it; `given`:
+    recordings that are elsewhere.
     """
     for path in given:
         if not path.exists():

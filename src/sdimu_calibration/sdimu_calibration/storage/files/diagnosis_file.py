@@ -92,15 +92,7 @@ class DiagnosisFile(ResultModel):
 
 
 def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None) -> None:
-    """Write diagnosis.json.
-
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    null : Null, optional
-        Of a bootstrap.
-    """
+    """Write diagnosis.json. `null` is that of a bootstrap."""
     _file(summary, **({"bootstrap": _null(null)} if null else {})).write(path)
 
 
@@ -187,12 +179,7 @@ def unpacked(text: str, k: int) -> Bytes | None:
 def alone(evidence: LinearEvidence, free: Sequence[int] = ()) -> Alone:
     """Give every candidate of the catalogue alone beside the given model, however small: many units make it large.
 
-    Parameters
-    ----------
-    evidence : LinearEvidence
-        Of a recording, or of a set.
-    free : sequence of int
-        Columns of the evidence that are no candidates.
+    `evidence`: of a recording, or of a set; `free`: columns of the evidence that are no candidates.
     """
     first = scan(evidence.information, evidence.model, evidence.weight)
     J = evidence.information.given(evidence.model, evidence.weight).J

@@ -55,15 +55,8 @@ _GRADES = ("navigation", "tactical", "mems")
 def load_effect(path: Path) -> tuple[Effect, ...]:
     """Read an effect of one's own.
 
-    Parameters
-    ----------
-    path : Path
-        YAML file of format ``sdimu-effect/1``.
-
-    Returns
-    -------
-    tuple of Effect
-        One a parameter, all of one family: each has a prior of its own. Parameters are named ``NAME_PARAMETER``.
+    `path`: YAML file of format ``sdimu-effect/1``. Gives one effect a parameter, all of one family: each has a prior of
+    its own. Parameters are named ``NAME_PARAMETER``.
     """
     file = read_effect_file(path)
     if file.name in registry.names():
@@ -168,12 +161,8 @@ _WITH_COEFFICIENT = (
 def extended_model(name: str, added: Sequence[str]) -> Model:
     """Read a model and add effects to it; what it has of one already is not added twice.
 
-    Parameters
-    ----------
-    name : str
-        Model by name or path; its effects may be paths of YAML files too, seen from the folder of the model.
-    added : sequence of str
-        As for `find_effects`.
+    `name`: model by name or path; its effects may be paths of YAML files too, seen from the folder of the model.
+    `added`: as for `find_effects`.
     """
     model = load_model(name)
     folder = find_config("model", name).parent
@@ -193,13 +182,7 @@ def _beside(folder: Path, text: str) -> str:
 
 
 def new_parts(effects: Sequence[Effect], model: Sequence[Effect], name: str) -> list[Effect]:
-    """Return of some effects what a model does not have yet.
-
-    Parameters
-    ----------
-    name : str
-        Of what is added, for the error.
-    """
+    """Return of some effects what a model does not have yet. `name`: of what is added, for the error."""
     new = _parts(effects, model)
     if not new:
         raise DataError(f"'{name}' is in the model already")

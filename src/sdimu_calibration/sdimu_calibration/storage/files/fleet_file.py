@@ -93,15 +93,7 @@ class FleetFile(ResultModel):
 
 
 def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
-    """Write fleet.json.
-
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    done : Study
-        What they say together.
-    """
+    """Write fleet.json. `done`: what they say together."""
     first = gathered.entries[0].result
     shown = dict(zip(first.names, zip(first.units, first.display_units, strict=True), strict=True))
     FleetFile.model_construct(

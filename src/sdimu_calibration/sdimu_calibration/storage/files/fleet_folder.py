@@ -68,12 +68,8 @@ class Gathered:
 def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
     """Find every result.json below some folders, and take those that fit together.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Folders, or result.json files.
-    one_model : bool
-        Set results of other models apart, not those of other IMU files and body frames alone.
+    `folders`: folders, or result.json files; `one_model`: set results of other models apart, not those of other IMU
+    files and body frames alone.
     """
     apart: list[str] = []
     usable = [entry for name, path in _found(folders) if (entry := _read(name, path, apart)) is not None]

@@ -64,12 +64,7 @@ def write_measured_imu(
 def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:
     """Sizes (SI) of the terms beside white noise that a triad shows, root mean square of its axes.
 
-    Parameters
-    ----------
-    terms : mapping of str to Terms
-        By channel.
-    triad : str
-        ``gyro`` or ``accel``.
+    `terms`: by channel; `triad`: ``gyro`` or ``accel``.
     """
     axes = [t for channel, t in terms.items() if channel.startswith(triad)]
     out = {}

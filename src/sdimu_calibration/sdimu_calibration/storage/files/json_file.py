@@ -34,12 +34,8 @@ def json_text(content: Any) -> str:
 def entry(value: Any, keys: str, **more: Any) -> dict[str, Any]:
     """Give an object as an entry of a file.
 
-    Parameters
-    ----------
-    keys : str
-        Its keys in their order: the name of an attribute, or ``key=attribute`` where the file has another word for it.
-    more
-        Keys that come after them.
+    `keys`: its keys in their order: the name of an attribute, or ``key=attribute`` where the file has another word for
+    it; `more`: keys that come after them.
     """
     pairs = (word.partition("=") for word in keys.split())
     return {key: attrgetter(attribute or key)(value) for key, _, attribute in pairs} | more

@@ -19,18 +19,7 @@ class _LimitsFile(Schema):
 
 
 def read_limits(path: Path, terms: Mapping[str, str]) -> dict[str, float]:
-    """Read limits.
-
-    Parameters
-    ----------
-    terms : mapping of str to str
-        Unit of each term that a data sheet knows.
-
-    Returns
-    -------
-    dict of str to float
-        Largest size allowed (SI) by term.
-    """
+    """Read limits. `terms`: unit of each term that a data sheet knows. Gives the largest size allowed (SI) by term."""
     out = {}
     for term, text in read_yaml(path, _LimitsFile).limits.items():
         if term not in terms:

@@ -160,12 +160,7 @@ class ResultFile(ResultModel):
 def write_result(path: Path, calibration: Calibration, verdict: Verdict | None = None) -> None:
     """Write result.json: SI numbers, ``null`` for what is not a finite number.
 
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    verdict : Verdict, optional
-        Of a diagnosis, where one was made; no note then advises one.
+    `verdict`: of a diagnosis, where one was made; no note then advises one.
     """
     c, told = calibration, without_advice if verdict else tuple
     seldom: dict[str, Any] = {

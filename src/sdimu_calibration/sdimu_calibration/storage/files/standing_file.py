@@ -72,13 +72,7 @@ def holds_standing(path: Path) -> bool:
 
 
 def read_standing(path: Path) -> Standing:
-    """Read what a diagnosis knows.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of its results, or set.json or diagnosis.json in it.
-    """
+    """Read what a diagnosis knows. `path`: folder of its results, or set.json or diagnosis.json in it."""
     path = Path(path)
     file = path if path.is_file() else next((path / n for n in FILES if (path / n).is_file()), path / "diagnosis.json")
     content = read_json(file, FILES.get(file.name, "sdimu-diagnosis/1"))
@@ -93,12 +87,7 @@ def read_standing(path: Path) -> Standing:
 def standing_of_result(path: Path, imu: str | None) -> Standing:
     """Take what a result knows of the coefficients of its model; its classes are not in it.
 
-    Parameters
-    ----------
-    path : Path
-        Folder with result.json, or the file.
-    imu : str or None
-        Name or path in place of the name in the result.
+    `path`: folder with result.json, or the file; `imu`: name or path in place of the name in the result.
     """
     path = Path(path)
     result = read_result(path)

@@ -76,13 +76,7 @@ def _made(folder: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text file beside its place and rename it: a reader never meets half of it; its folder is made too.
-
-    Parameters
-    ----------
-    path : Path
-        File to make or replace.
-    """
+    """Write a text file beside its place and rename it: a reader never meets half of it; its folder is made too."""
     path = Path(path)
     if path.is_dir():
         raise DataError(f"{path}: is a folder; name a file to write")
@@ -105,15 +99,8 @@ def written_together(folder: Path) -> Iterator[Path]:
 
     Two runs into one folder leave the files of the one or of the other, never some of each.
 
-    Parameters
-    ----------
-    folder : Path
-        Made when it is not there. Files of other names stay; with a new result the `COMPANIONS` of the old one go.
-
-    Yields
-    ------
-    Path
-        Empty folder inside `folder`.
+    Gives an empty folder inside `folder`, which is made when it is not there. Files of other names stay; with a new
+    result the `COMPANIONS` of the old one go.
     """
     folder = Path(folder)
     part = beside(folder / "run")

@@ -16,10 +16,7 @@ _WITH_POINT = re.compile(r"[-+]?\d*\.\d*(?:[eE][-+]?\d+)?")
 def split(line: str, delimiter: str | None) -> list[str]:
     """Cut a line into cells; a delimiter in quotes is a part of its cell.
 
-    Parameters
-    ----------
-    delimiter : str or None
-        None stands for blanks and tabs.
+    `delimiter`: None stands for blanks and tabs.
     """
     if '"' not in line:
         return [cell.strip(_EDGES) for cell in line.split(delimiter)]
@@ -64,10 +61,7 @@ def delimiter_of(line: str, decimal: str) -> str | None:
 def decimal_of(lines: Sequence[str], delimiter: str | None) -> str:
     """Tell the decimal comma from the point by how most numbers are written.
 
-    Parameters
-    ----------
-    delimiter : str or None
-        As the user states it; None tries all.
+    `delimiter`: as the user states it; None tries all.
     """
     commas = points = 0
     for line in lines:

@@ -117,10 +117,7 @@ def changes(numbers: Floats) -> Bools:
 def _kind(stem: str, number: str) -> tuple[str, str, str]:
     """Tell accelerometers from gyros by what stands before the axis, and name the IMU by what else stands there.
 
-    Returns
-    -------
-    kind, word, which : str
-        The sensor, the word that says it, and the name of the IMU; empty where none is told.
+    Gives the sensor, the word that says it, and the name of the IMU; empty where none is told.
     """
     words = [word for word in re.split(r"[ _.\-/]+", stem.strip().lower()) if word]
     best = "", "", ""

@@ -49,11 +49,8 @@ class Imported:
 def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
     """Read the files that a map describes.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the map
-        names, or, where it names none, one stretch of time each, in this order.
+    `paths`: CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the
+    map names, or, where it names none, one stretch of time each, in this order.
     """
     named = (
         chart.accel.file,
@@ -151,12 +148,7 @@ def _one_status(parts: Sequence[Status]) -> Status | None:
 def write_imported(path: Path, found: Imported, replace: bool = False, custom: Mapping[str, str] | None = None) -> None:
     """Write imported samples to a rosbag2 folder.
 
-    Parameters
-    ----------
-    replace : bool
-        Replace a bag that is there.
-    custom : mapping of str to str, optional
-        What the user says of the unit: ``serial``, ``power_on``.
+    `replace`: replace a bag that is there; `custom`: what the user says of the unit: ``serial``, ``power_on``.
     """
     write_recording(
         path,

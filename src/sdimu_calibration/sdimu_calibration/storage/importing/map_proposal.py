@@ -44,15 +44,8 @@ class Proposal:
 def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     """Propose a map for each IMU in a file.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        Files of one form; the first one is looked at.
-
-    Raises
-    ------
-    DataError
-        The file holds no columns in text, or they cannot be told.
+    `paths`: files of one form; the first one is looked at. Raises DataError where the file holds no columns in text, or
+    they cannot be told.
     """
     path = Path(paths[0])
     check_file(path)

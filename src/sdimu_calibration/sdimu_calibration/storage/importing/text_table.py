@@ -121,10 +121,7 @@ class TextTable:
     def leave_out_broken(self, as_nan: bool = False) -> bool:
         """Leave out lines that a serial link or a full disk broke, while they are few; whether there were any.
 
-        Parameters
-        ----------
-        as_nan : bool
-            Where the lines are the clock: they count as samples without numbers.
+        `as_nan`: where the lines are the clock: they count as samples without numbers.
         """
         rows = self._rows()
         numeric = self._numeric(rows)
