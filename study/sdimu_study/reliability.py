@@ -194,10 +194,10 @@ def _held(true: float, told: float, low: float, high: float) -> str:
     return "yes" if low <= true <= high or abs(true - told) <= 0.05 else "no"
 
 
-def _hits(low: float, high: float, least: float = 0.5) -> Any:
+def _hits(low: float, high: float) -> Any:
     def cell(g: Group) -> str:
         told = [max(h["p"], h["class"]) for row in g.good for h in row["hidden"] if low <= h["sigmas"] < high]
-        return of(sum(p > least for p in told), told)
+        return of(sum(p > 0.5 for p in told), told)
 
     return cell
 

@@ -41,12 +41,10 @@ class Declare:
         """Declare a yes or no."""
         return bool(self._declare(name, default, ParameterDescriptor(description=description, read_only=not live)))
 
-    def integer(
-        self, name: str, default: int, description: str, *, least: int = -_LARGE, most: int = _LARGE, live: bool = False
-    ) -> int:
+    def integer(self, name: str, default: int, description: str, *, least: int, most: int = _LARGE) -> int:
         """Declare a whole number between `least` and `most`."""
         span = IntegerRange(from_value=least, to_value=most, step=1)
-        described = ParameterDescriptor(description=description, read_only=not live, integer_range=[span])
+        described = ParameterDescriptor(description=description, read_only=True, integer_range=[span])
         return int(self._declare(name, default, described))
 
     def number(

@@ -103,14 +103,14 @@ def _in_white(diagnosis: Diagnosis) -> str:
     return " in white noise" if diagnosis.found.noise else ""
 
 
-def draw_heat_map(axes: Any, grid: data.Grid, channels: Sequence[str] = CHANNEL_NAMES) -> None:
+def draw_heat_map(axes: Any, grid: data.Grid) -> None:
     """Draw residual means, channel by stop, in axes of matplotlib: number and sign in each cell, colour besides."""
     colours = LinearSegmentedColormap.from_list("signed", paint(DIVERGING, LIGHT))
     axes.imshow(grid.value, cmap=colours, vmin=-_FULL, vmax=_FULL, aspect="auto")
     for (row, column), value in np.ndenumerate(grid.value):
         ink = "white" if abs(value) > _WHITE_FROM else _INK
         axes.text(column, row, cell(float(value)), ha="center", va="center", fontsize=6.5, color=ink)
-    axes.set_yticks(range(len(channels)), [name.replace("_", " ") for name in channels], fontsize=7.5)
+    axes.set_yticks(range(len(CHANNEL_NAMES)), [name.replace("_", " ") for name in CHANNEL_NAMES], fontsize=7.5)
     axes.set_xticks(range(len(grid.stops)), [str(stop) for stop in grid.stops], fontsize=7.5)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)

@@ -53,11 +53,6 @@ class Knowledge:
     """Labels of everything that was found."""
     verdict: Verdict
 
-    @property
-    def holds(self) -> bool:
-        """Whether all limits hold."""
-        return bool((self.ratio <= 1.0).all())
-
 
 def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     """Take from a diagnosis what the choice of the next move needs. `found`: of what was recorded so far."""

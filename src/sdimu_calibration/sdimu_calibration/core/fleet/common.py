@@ -67,11 +67,7 @@ class CommonEffect:
 
 
 def common_effects(
-    names: Sequence[str],
-    estimates: Floats,
-    sigmas: Floats,
-    rate: float = FALSE_DISCOVERY,
-    correlations: Bytes | None = None,
+    names: Sequence[str], estimates: Floats, sigmas: Floats, correlations: Bytes | None = None
 ) -> tuple[CommonEffect, ...]:
     """Test every effect over all units.
 
@@ -81,8 +77,6 @@ def common_effects(
         Candidate effects.
     estimates, sigmas : ndarray, shape (m, k)
         Of each effect in each unit, the effect alone in the model of the unit (SI); NaN where a unit cannot show it.
-    rate : float
-        False discoveries among those named.
     correlations : ndarray of int, shape (m, k, k), optional
         Of the estimates in each unit, times `STEPS`; without them all that stand out are named at once.
 
@@ -92,11 +86,11 @@ def common_effects(
         Those that `FEWEST` units know: those named in their order, then by probability.
     """
     if correlations is None:
-        return _tested(names, estimates, sigmas, rate)
+        return _tested(names, estimates, sigmas)
     chosen: list[int] = []
     named: list[CommonEffect] = []
     while True:
-        found = _tested(names, *given(estimates, sigmas, correlations, chosen), rate)
+        found = _tested(names, *given(estimates, sigmas, correlations, chosen))
         if not found or not found[0].named:
             break
         top = found[0]
@@ -145,14 +139,14 @@ def given(estimates: Floats, sigmas: Floats, correlations: Bytes, chosen: Sequen
     return out[0], out[1]
 
 
-def _tested(names: Sequence[str], estimates: Floats, sigmas: Floats, rate: float) -> tuple[CommonEffect, ...]:
+def _tested(names: Sequence[str], estimates: Floats, sigmas: Floats) -> tuple[CommonEffect, ...]:
     """Test every effect by itself, smallest probability first."""
     known = np.isfinite(estimates) & np.isfinite(sigmas) & (sigmas > 0.0)
     looked_at = [k for k in range(len(names)) if known[:, k].sum() >= FEWEST]
     rows = [_fit(estimates[known[:, k], k], sigmas[known[:, k], k]) for k in looked_at]
     q_values = adjusted(np.array([row[-2] for row in rows]))
     found = [
-        CommonEffect(names[k], int(known[:, k].sum()), *row[:-1], float(q), bool(q <= rate), row[-1])
+        CommonEffect(names[k], int(known[:, k].sum()), *row[:-1], float(q), bool(q <= FALSE_DISCOVERY), row[-1])
         for k, row, q in zip(looked_at, rows, q_values, strict=True)
     ]
     return tuple(sorted(found, key=lambda one: (one.p_value, -one.ratio)))

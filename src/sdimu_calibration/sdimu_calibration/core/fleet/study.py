@@ -46,13 +46,8 @@ class Trend:
     named: bool = False
 
 
-def trends(fleet: Measured, rate: float = FALSE_DISCOVERY) -> tuple[Trend, ...]:
+def trends(fleet: Measured) -> tuple[Trend, ...]:
     """Fit a slope with the date to every coefficient.
-
-    Parameters
-    ----------
-    rate : float
-        False discoveries among the slopes that are named.
 
     Returns
     -------
@@ -68,7 +63,9 @@ def trends(fleet: Measured, rate: float = FALSE_DISCOVERY) -> tuple[Trend, ...]:
         if one is not None
     ]
     q_values = adjusted(np.array([one.p_value for one in found]))
-    judged = [replace(one, q_value=float(q), named=bool(q <= rate)) for one, q in zip(found, q_values, strict=True)]
+    judged = [
+        replace(one, q_value=float(q), named=bool(q <= FALSE_DISCOVERY)) for one, q in zip(found, q_values, strict=True)
+    ]
     return tuple(sorted(judged, key=lambda one: one.p_value))
 
 

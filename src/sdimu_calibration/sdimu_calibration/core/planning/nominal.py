@@ -85,17 +85,13 @@ _LEAST_DWELL_S = 2.0
 """Shortest first dwell (s): contains a complete epoch of a second, wherever the epochs begin."""
 
 
-def nominal_recording(
-    plan: Plan, site: Site, mount_rad: Floats | None = None, rate_hz: float = RATE_HZ, C_nt: Floats | None = None
-) -> Recording:
+def nominal_recording(plan: Plan, site: Site, mount_rad: Floats | None = None, C_nt: Floats | None = None) -> Recording:
     """Record a plan with a perfect IMU.
 
     Parameters
     ----------
     mount_rad : ndarray, shape (3,), optional
         Rotation vector of the IMU on the table (rad), ``C_tb = rotation_matrix(mount)``; zero by default.
-    rate_hz : float
-        Sample rate.
     C_nt : ndarray, shape (3, 3), optional
         Attitude of the table at stop 0, t to n; by default its X, Y, Z point north, east, down.
 
@@ -113,7 +109,7 @@ def nominal_recording(
     C_tb = rotation_matrix(np.zeros(3) if mount_rad is None else np.asarray(mount_rad, dtype=float))
     begin, end, ramps = _schedule(plan)
     total = end[-1] + plan.dwell_s[-1] if plan.turns else plan.dwell_s[0]
-    edges = np.arange(math.floor(total * rate_hz + 1e-6) + 1) / rate_hz
+    edges = np.arange(math.floor(total * RATE_HZ + 1e-6) + 1) / RATE_HZ
     # Each sample lies in the span of one turn (from the start of the turn to that of the next), but for the few
     # that a start cuts: those see the table at rest before it, which the clipped angle gives too.
     span = np.maximum(np.searchsorted(begin, edges[1:] - 1e-9, side="left") - 1, 0)
@@ -123,7 +119,7 @@ def nominal_recording(
     for k, turn in enumerate(plan.turns):
         rows = np.flatnonzero(span == k)
         axis = _unit(turn.axis)
-        mean_cos, mean_sin, mean_rate = _means(edges[rows] - begin[k], 1.0 / rate_hz, turn, ramps[k])
+        mean_cos, mean_sin, mean_rate = _means(edges[rows] - begin[k], 1.0 / RATE_HZ, turn, ramps[k])
         omega[rows] = _turned_back(C_nt.T @ w_ie, axis, mean_cos, mean_sin) + mean_rate[:, None] * axis
         force[rows] = -gravity * _turned_back(C_nt.T @ down, axis, mean_cos, mean_sin)
         C_nt = C_nt @ rotation_matrix(turn.angle_rad * axis)

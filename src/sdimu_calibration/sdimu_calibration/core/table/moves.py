@@ -82,13 +82,7 @@ class Move:
         return self.waypoints[-1].time_s
 
 
-def plan_move(
-    table: RateTable,
-    angles: Floats,
-    step: Step,
-    axis: tuple[int, float] | None = None,
-    tolerance_rad: float = _ALONG_RAD,
-) -> Move:
+def plan_move(table: RateTable, angles: Floats, step: Step, axis: tuple[int, float] | None = None) -> Move:
     """Make the move of a step.
 
     Parameters
@@ -98,8 +92,6 @@ def plan_move(
     axis : (int, float), optional
         Joint and sense that make the turn, as `assign_turns` gives them; chosen when left out: the innermost that stays
         within its limits.
-    tolerance_rad : float
-        How far from the platform axis a gimbal axis may be (rad).
     """
     here = np.asarray(angles, dtype=np.float64)
     if not (math.isfinite(step.dwell_s) and step.dwell_s >= 0.0):
@@ -109,7 +101,7 @@ def plan_move(
             raise DataError(f"{step.words}: nothing to do (state a turn or a dwell)")
         return Move(step, "", None, (Waypoint(step.dwell_s, tuple(here.tolist()), (0.0, 0.0, 0.0)),), 0.0)
     reasons = []
-    for k, sign in [axis] if axis else reversed(_joints(table, here, step, tolerance_rad)):
+    for k, sign in [axis] if axis else reversed(_joints(table, here, step)):
         corners, reason = _corners(table.limits[k], step, sign, float(here[k]), table.sample_rate_hz)
         if not reason:
             return _move(table, here, step, (k, sign), corners)
@@ -161,7 +153,7 @@ def moves_of(table: RateTable, angles: Floats, plan: Plan) -> tuple[Move, ...]:
     return tuple(moves)
 
 
-def _joints(table: RateTable, angles: Floats, step: Step, tolerance_rad: float) -> list[tuple[int, float]]:
+def _joints(table: RateTable, angles: Floats, step: Step) -> list[tuple[int, float]]:
     """Joints that turn about the axis of a step, with sense; the innermost is last."""
     assert step.turn is not None
     axis = step.turn.axis
@@ -171,7 +163,7 @@ def _joints(table: RateTable, angles: Floats, step: Step, tolerance_rad: float) 
         raise DataError(f"{step.words}: no axis or joint '{axis}' (there are: X, Y, Z, {', '.join(table.joints)})")
     if table.axes is None:
         return [("XYZ".index(axis), 1.0)]
-    found = axes_along(axis, angles, table.axes, tolerance_rad)
+    found = axes_along(axis, angles, table.axes, _ALONG_RAD)
     if not found:
         at = ", ".join(f"{name} {math.degrees(a):g}" for name, a in zip(table.joints, angles, strict=True))
         raise DataError(f"{step.words}: no gimbal axis is along {axis} at {at} deg")

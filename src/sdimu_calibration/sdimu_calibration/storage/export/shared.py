@@ -68,9 +68,9 @@ def by_temperature(linear: LinearModel) -> dict[Factor, Part]:
     return {} if linear.temperature_degc is None else dict(linear.parts)
 
 
-def factor_text(factor: Factor, difference: str = "(T - T0)") -> str:
+def factor_text(factor: Factor) -> str:
     """Write what a part is multiplied by."""
-    power = difference + (f"^{factor.power}" if factor.power > 1 else "") if factor.power else ""
+    power = "(T - T0)" + (f"^{factor.power}" if factor.power > 1 else "") if factor.power else ""
     return " ".join(word for word in (power, "dT/dt" if factor.rate_power else "") if word)
 
 
