@@ -112,15 +112,7 @@ def _split(text: str) -> tuple[str, str]:
 def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float]:
     """Read the options of a key.
 
-    Parameters
-    ----------
-    expected : mapping of str to str
-        Unit of each option.
-
-    Returns
-    -------
-    dict of str to float
-        Value of each option (SI), in the order of `expected`.
+    `expected`: unit of each option. Gives the value of each option (SI), in the order of `expected`.
     """
     if set(key.options) != set(expected):
         example = variant({name: f"1 {unit}".removesuffix(" 1") for name, unit in expected.items()})

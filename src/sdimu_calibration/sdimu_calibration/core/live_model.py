@@ -92,12 +92,8 @@ class LiveModel:
 def live_model(options: OpeningOptions, model: Model) -> LiveModel:
     """Put together what the filter on the way estimates.
 
-    Parameters
-    ----------
-    options : OpeningOptions
-        The IMU file may state noise with a memory, the site how far it is to be trusted.
-    model : Model
-        With p coefficients.
+    `options`: the IMU file may state noise with a memory, the site how far it is to be trusted; `model`: with p
+    coefficients.
     """
     setup = set_up(options.site, options.imu, model, EPOCH_S)
     sensors = with_references(setup.sensors, stated_references(options.site))

@@ -88,15 +88,8 @@ class Unit:
 def parse_unit(text: str) -> Unit:
     """Read a unit such as ``deg/h/sqrt(Hz)``.
 
-    Parameters
-    ----------
-    text : str
-        Products with ``*`` or ``/`` of named units with ``^power``; ``sqrt(unit)`` halves the powers.
-
-    Raises
-    ------
-    UnitError
-        When a name in it is unknown.
+    `text`: products with ``*`` or ``/`` of named units with ``^power``; ``sqrt(unit)`` halves the powers. Raises
+    UnitError when a name in it is unknown.
     """
     factor = 1.0
     powers: dict[str, Fraction] = {}

@@ -25,17 +25,8 @@ def leave_report(folder: Path, test: PreparedTest, model: Model, name: str) -> N
 
     They come beside the result.json of the node, which stays as it is: write it first.
 
-    Parameters
-    ----------
-    model : Model
-        With what was added to it.
-    name : str
-        Of the model, for the page.
-
-    Raises
-    ------
-    DataError
-        Where the test cannot be diagnosed.
+    `model`: with what was added to it; `name`: of the model, for the page. Raises DataError where the test cannot be
+    diagnosed.
     """
     found = climb(solve(test, model))
     summary, more = summarise(found), report_extras(found)

@@ -71,17 +71,8 @@ class Monitor:
     def add(self, effects: Sequence[str], seconds: float = ANSWER_S) -> str:
         """Let the calibration node take effects into the model, beside those that were added before.
 
-        Parameters
-        ----------
-        effects : sequence of str
-            Names, equations or files.
-        seconds : float
-            Wall time in which the node must answer.
-
-        Returns
-        -------
-        str
-            Why it did not; empty when it did.
+        `effects`: names, equations or files; `seconds`: wall time in which the node must answer. Gives why it did not;
+        empty when it did.
         """
         client = AsyncParameterClient(self._node, "calibration")
         if not self._answered(client.services_are_ready, seconds):

@@ -30,14 +30,8 @@ def odds_section(
 ) -> str:
     """Return the section; empty where there are no probabilities.
 
-    Parameters
-    ----------
-    where : str
-        What the data are of, as it ends a sentence.
-    averaged : bool
-        Coefficients and sigmas of the page are means over the models.
-    found : mapping of str to str, optional
-        Sizes in words of what the page tells as found, by label: a size stands on a page once.
+    `where`: what the data are of, as it ends a sentence; `averaged`: coefficients and sigmas of the page are means over
+    the models; `found`: sizes in words of what the page tells as found, by label: a size stands on a page once.
     """
     sizes = found or {}
     if told is None:

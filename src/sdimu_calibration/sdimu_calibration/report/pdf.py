@@ -27,20 +27,7 @@ def browser() -> str:
 
 
 def print_pdf(page: Path, program: str) -> Path:
-    """Print a page beside itself.
-
-    Parameters
-    ----------
-    page : Path
-        HTML file.
-    program : str
-        Of `browser`.
-
-    Returns
-    -------
-    Path
-        The PDF.
-    """
+    """Print a page beside itself. `program`: of `browser`. Gives the PDF."""
     target = page.with_suffix(".pdf")
     target.unlink(missing_ok=True)
     with tempfile.TemporaryDirectory() as own:

@@ -48,14 +48,9 @@ _MOST_BARS = 8
 def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeInertialRun] = ()) -> list[Path]:
     """Write heat map before and after, candidates, ladder, drift in use and the architecture as PNG files.
 
-    Parameters
-    ----------
-    folder : Path
-        Made when it is not there; files of the same names are replaced.
-    diagnosis : Diagnosis
-        Best of a recording with something missing: else there is no "after", and no ladder.
-    trials : sequence of FreeInertialRun
-        Free navigations; none leaves the picture of the drift out.
+    `folder`: made when it is not there; files of the same names are replaced. `diagnosis`: best of a recording with
+    something missing: else there is no "after", and no ladder. `trials`: free navigations; none leaves the picture of
+    the drift out.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):

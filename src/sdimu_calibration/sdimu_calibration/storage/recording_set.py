@@ -144,14 +144,7 @@ def set_of(bags: Sequence[Path], like: BagSource) -> RecordingSet:
 def set_options(wanted: RecordingSet, model: str | None, add: Sequence[str], estimator: str) -> SetOptions:
     """Say how a set is to be fitted: what is asked for comes before what its file says.
 
-    Parameters
-    ----------
-    model : str or None
-        Name or path.
-    add : sequence of str
-        Effects to add.
-    estimator : str
-        ``auto`` is that of the file.
+    `model`: name or path; `add`: effects to add; `estimator`: ``auto`` is that of the file.
     """
     chosen = estimator if estimator != AUTO else wanted.estimator
     handheld = chosen == HANDHELD or (chosen == AUTO and _first_is_handheld(wanted.members))

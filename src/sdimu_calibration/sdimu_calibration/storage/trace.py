@@ -32,14 +32,8 @@ class Trace:
 def traced(bags: Sequence[Path] = (), arguments: Sequence[str] = (), **stated: str | Path | None) -> Trace:
     """Put down what is known now.
 
-    Parameters
-    ----------
-    bags : sequence of Path
-        Recordings, whose files are read once more for their hashes.
-    arguments : sequence of str
-        Of the command line, without the name of the program; empty from Python.
-    stated
-        What the user named, by what it is; None for what was left out.
+    `bags`: recordings, whose files are read once more for their hashes. `arguments`: of the command line, without the
+    name of the program; empty from Python. `stated`: what the user named, by what it is; None for what was left out.
     """
     files = [(str(path), digest) for bag in bags for path, (_, digest) in file_hashes(bag).items()]
     plan = next((said for bag in bags if (said := custom_data(bag).get("plan"))), None)

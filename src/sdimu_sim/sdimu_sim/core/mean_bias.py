@@ -20,17 +20,8 @@ BIASES = tuple(name for name in COEFFICIENTS if "_bias_" in name)
 def mean_bias(truth: ImuTruth, t: Floats, phase: PhaseLog, interval_s: float, seed: int) -> Mapping[str, float]:
     """Biases in the mean over all dwells.
 
-    Parameters
-    ----------
-    t : ndarray, shape (m,)
-        Stamps of the samples (s).
-    phase : PhaseLog
-        When the table stands.
-
-    Returns
-    -------
-    mapping of str to float
-        SI, by name; empty where the biases are constants.
+    `t`, shape (m,): stamps of the samples (s); `phase`: when the table stands. Gives the biases (SI) by name; empty
+    where they are constants.
     """
     drifts = [e for e in parse_effects(truth.effects).terms if e.expression.names <= {"t", *e.parameters, *CONSTANTS}]
     drifts = [e for e in drifts if "t" in e.expression.names and ":" not in e.name]

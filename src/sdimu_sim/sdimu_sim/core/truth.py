@@ -135,17 +135,7 @@ def input_axes(triad: str, coefficients: Mapping[str, float]) -> Floats:
 
     Each axis is the body axis really turned by its two angles (one rotation vector), times 1 + scale.
 
-    Parameters
-    ----------
-    triad : str
-        ``gyro`` or ``accel``.
-    coefficients : mapping of str to float
-        As built.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        A row per sensor, in b.
+    `triad`: ``gyro`` or ``accel``; `coefficients`: as built. Gives a matrix, shape (3, 3): a row per sensor, in b.
     """
     rows = np.empty((3, 3))
     for i, own in enumerate(_XYZ):

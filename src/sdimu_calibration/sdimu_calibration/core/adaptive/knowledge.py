@@ -70,12 +70,8 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
 def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[str, ...] = ()) -> Knowledge:
     """Take from a fit alone what the choice of the next move needs: nothing stands out of its noise.
 
-    Parameters
-    ----------
-    alike : sequence of Effect
-        Candidates that are estimated along in `Knowledge.at`.
-    named : tuple of str
-        Labels of what the model of the fit has beyond the one that was given.
+    `alike`: candidates that are estimated along in `Knowledge.at`; `named`: labels of what the model of the fit has
+    beyond the one that was given.
     """
     if not isinstance(fit, NavigationFit):
         raise DataError(

@@ -28,12 +28,8 @@ class Menu:
     def turns(self, apart: bool, square: bool) -> tuple[Turn, ...]:
         """List the turns to choose from.
 
-        Parameters
-        ----------
-        apart : bool
-            Something is to be told apart.
-        square : bool
-            The test stands along the axes; between them it only goes back, or on.
+        `apart`: something is to be told apart. `square`: the test stands along the axes; between them it only goes
+        back, or on.
         """
         angles = (*(self.angles_rad if square else ()), *(self.oblique_rad if apart or not square else ()))
         rates = (self.rate_rad_s, self.slow_rad_s) if apart else (self.rate_rad_s,)

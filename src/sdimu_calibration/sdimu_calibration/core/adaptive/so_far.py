@@ -126,15 +126,7 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, h
 
 
 def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: float) -> Ahead:
-    """Simulate the covariance of a move.
-
-    Parameters
-    ----------
-    turn : Turn or None
-        None stays where it is.
-    dwell_s : float
-        Longest stop after it.
-    """
+    """Simulate the covariance of a move. `turn`: None stays where it is; `dwell_s`: longest stop after it."""
     setup, sensors = at.setup, at.setup.sensors
     turns = () if turn is None else (turn,)
     rests = (_BEFORE_S, dwell_s) if turns else (_BEFORE_S + dwell_s,)

@@ -112,12 +112,7 @@ def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration:
     (12 h, navigation grade: by a third less each), where those of second order need five. Effects that change at
     random are left to the ordinary passes, as samples are corrected at constants here: for them the answer is no.
 
-    Parameters
-    ----------
-    gravity : float
-        m/s^2.
-    duration : float
-        Of the test (s).
+    `gravity`: m/s^2; `duration`: of the test (s).
     """
     if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
         return False

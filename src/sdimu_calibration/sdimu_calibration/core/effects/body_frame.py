@@ -361,12 +361,7 @@ def pinned_in(names: Sequence[str], frame: str = FRAMES[0]) -> tuple[str, ...]:
 
     None where the model cannot turn: it has not all of `pinned_names`.
 
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Of the model.
-    frame : str
-        One of `FRAMES`.
+    `names`, length p: of the model; `frame`: one of `FRAMES`.
     """
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return ()
@@ -394,12 +389,7 @@ def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> Non
 def turning_names(names: Sequence[str], frame: str) -> frozenset[str]:
     """Coefficients whose values depend on the body frame: a prior of one is stated in the frame of the report.
 
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Of the model.
-    frame : str
-        One of `FRAMES`.
+    `names`, length p: of the model; `frame`: one of `FRAMES`.
     """
     if not pinned_in(names, frame):
         return frozenset()

@@ -27,15 +27,8 @@ NORTH, EAST = NAMES = ("earth_rate_north", "earth_rate_east")
 def horizontal_earth_rate(latitude: float) -> Effect:
     """Make the effect of a horizontal Earth rate that is not the one of the assumed azimuth.
 
-    Parameters
-    ----------
-    latitude : float
-        Of the site (rad).
-
-    Returns
-    -------
-    Effect
-        ``dw = C_bn (north, east, 0)``: true minus assumed Earth rate, along North and East of the assumed azimuth.
+    `latitude`: of the site (rad). Its equation is ``dw = C_bn (north, east, 0)``: true minus assumed Earth rate, along
+    North and East of the assumed azimuth.
     """
     sigma = horizontal(latitude) / float(np.sqrt(2.0))
     return Effect(
@@ -55,12 +48,7 @@ def horizontal_earth_rate(latitude: float) -> Effect:
 def of_any_direction(sensors: ImuModel, latitude: float) -> ImuModel:
     """Return a model with the effect whose prior of the whole Earth rate prefers no direction.
 
-    Parameters
-    ----------
-    sensors : ImuModel
-        With the effect.
-    latitude : float
-        Of the site (rad).
+    `sensors`: with the effect; `latitude`: of the site (rad).
     """
     mean = sensors.mean.copy()
     mean[sensors.names.index(NORTH)] = -horizontal(latitude)

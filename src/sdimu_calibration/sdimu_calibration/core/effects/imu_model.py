@@ -135,12 +135,8 @@ def _errors(values: Floats, channel: Ints, size: Floats) -> Floats:
 def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     """Put effects together.
 
-    Parameters
-    ----------
-    effects : sequence of str or Effect
-        Registered names, or effects of one's own.
-    imu : ImuSpecification
-        Gives the priors: by effect name, else the effect's own for the IMU's grade.
+    `effects`: registered names, or effects of one's own; `imu`: gives the priors: by effect name, else the effect's own
+    for the IMU's grade.
     """
     chosen = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in effects])
     _check_priors(chosen, imu)

@@ -109,12 +109,7 @@ the vertical as it sees force along its input axis, an accelerometer gravity as 
 def told_of(site: Site | None, names: Sequence[str]) -> tuple[Reference, ...]:
     """List what a calibration takes from its site, as told.
 
-    Parameters
-    ----------
-    site : Site or None
-        None for a run by hand without one: gravity is then standard gravity.
-    names : sequence of str
-        Coefficients of the result.
+    `site`: None for a run by hand without one, gravity is then standard gravity; `names`: coefficients of the result.
     """
 
     def one(effect: Effect, told: float, sigma: float, origin: str) -> Reference:

@@ -64,12 +64,7 @@ def known_terms() -> dict[str, str]:
 def datasheet(samples: Sequence[Sample], noise: Sequence[NoiseOfUnit] = ()) -> tuple[Line, ...]:
     """Make the lines of a data sheet; what was not measured is there, too, with what would.
 
-    Parameters
-    ----------
-    samples : sequence of Sample
-        Of one type and body frame.
-    noise : sequence of NoiseOfUnit
-        Noise found in recordings at rest.
+    `samples`: of one type and body frame; `noise`: noise found in recordings at rest.
     """
     lines = {term: Line(term, "", unit) for term, unit in known_terms().items()}
     for term in lines:

@@ -14,15 +14,7 @@ def population_priors(people: Population, effect_of: Mapping[str, str]) -> dict[
     An IMU file has one sigma about zero for all coefficients of an effect: the root mean square over them of mean,
     spread and error of the mean.
 
-    Parameters
-    ----------
-    effect_of : mapping of str to str
-        Effect of each coefficient.
-
-    Returns
-    -------
-    dict of str to float
-        One sigma (SI) by effect, in the order of the coefficients.
+    `effect_of`: effect of each coefficient. Gives one sigma (SI) by effect, in the order of the coefficients.
     """
     squares: dict[str, list[float]] = {}
     for one in people.coefficients:

@@ -49,10 +49,7 @@ class Trend:
 def trends(fleet: Measured) -> tuple[Trend, ...]:
     """Fit a slope with the date to every coefficient.
 
-    Returns
-    -------
-    tuple of Trend
-        Smallest probability first; none where dates are unknown or all the same.
+    Smallest probability first; none where dates are unknown or all the same.
     """
     if not np.isfinite(fleet.dates_s).all():
         return ()
@@ -120,12 +117,7 @@ def study(fleet: Measured, model: Sequence[str], candidates: Candidates) -> Stud
 
     Effects that are in the model beyond the baseline are candidates of the type, too.
 
-    Parameters
-    ----------
-    model : sequence of str
-        Effects that all results have.
-    candidates : Candidates
-        Of the diagnoses; empty without any.
+    `model`: effects that all results have. `candidates`: of the diagnoses; empty without any.
     """
     people = population(fleet)
     left = without_those_out(fleet, people)

@@ -102,12 +102,7 @@ def basis(tau: Floats) -> Floats:
 def fit_terms(found: Allan, rng: np.random.Generator, draws: int = _DRAWS) -> Terms:
     """Fit the terms.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        For the draws that give the standard errors.
-    draws : int
-        The standard errors are known to ``1 / sqrt(2 draws)``.
+    `rng`: for the draws that give the standard errors; `draws`: the standard errors are known to ``1 / sqrt(2 draws)``.
     """
     misfit = _misfit(found)
     value = np.sqrt(_squares(found, misfit=misfit))

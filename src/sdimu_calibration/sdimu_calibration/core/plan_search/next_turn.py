@@ -128,12 +128,7 @@ def untold(ranked: Sequence[NextTurn], alike: Sequence[str | Effect]) -> str:
 
     A plan is foreseen at one temperature, so an effect of temperature has no part in what it foresees.
 
-    Parameters
-    ----------
-    ranked : sequence of NextTurn
-        Every turn that was tried.
-    alike : sequence of str or Effect
-        As for `next_turn`.
+    `ranked`: every turn that was tried; `alike`: as for `next_turn`.
     """
     if max((one.after for one in ranked), default=0.0) >= _NOTHING:
         return ""
@@ -147,12 +142,7 @@ def untold(ranked: Sequence[NextTurn], alike: Sequence[str | Effect]) -> str:
 def apart(told: Bounds, names: Sequence[str], sizes: Mapping[str, float] | None) -> float:
     """Significance in sigma by which the least separable pair of parameters differs.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Two coefficients or more.
-    sizes : mapping of str to float or None
-        As for `next_turn`.
+    `names`: two coefficients or more; `sizes`: as for `next_turn`.
     """
     rows = [told.names.index(name) for name in names]
     prior = told.prior[rows]

@@ -13,16 +13,8 @@ from sdimu_calibration.core.recording import DataError
 def within(start: Plan, able: Abilities, minutes: float) -> Plan:
     """Shorten a plan until it fits: all stops and turns together, else one at a time, else as far as it goes.
 
-    Parameters
-    ----------
-    minutes : float
-        Time available.
-
-    Returns
-    -------
-    Plan
-        The longest that fits of those with all stops and turns changed together; the shortest where none fits. The
-        start itself where it fits, or nothing shortens it.
+    `minutes`: time available. Gives the longest that fits of those with all stops and turns changed together; the
+    shortest where none fits; the start itself where it fits, or nothing shortens it.
     """
     limit = 60.0 * minutes * (1.0 + _ROUNDING)
     if start.duration_s <= limit:

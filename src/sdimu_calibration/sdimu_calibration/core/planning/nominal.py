@@ -35,15 +35,7 @@ def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
 
     With angle A, length T and ramps t_r at acceleration a: ``A = a t_r (T - t_r)``, the smaller root.
 
-    Parameters
-    ----------
-    number : int
-        Number of the turn in the plan, for the message.
-
-    Returns
-    -------
-    float
-        s.
+    `number`: of the turn in the plan, for the message. Gives the length in s.
     """
     size = abs(turn.angle_rad)
     length = size / turn.rate_rad_s

@@ -99,14 +99,7 @@ def _in_spreads(one: Coefficient) -> Floats:
 def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[str, str], heading: str) -> Figure:
     """Values of coefficients against the date, with mean and control limits; by number where dates are unknown.
 
-    Parameters
-    ----------
-    some : sequence of Coefficient
-        Those of one effect.
-    units : mapping of str to str
-        Customary unit of each.
-    heading : str
-        Cut from the names above the panels.
+    `some`: those of one effect; `units`: customary unit of each; `heading`: cut from the names above the panels.
     """
     rows = math.ceil(len(some) / _PANELS)
     titles = [literal(one.name.removeprefix(f"{heading}_")) for one in some]

@@ -58,17 +58,7 @@ def headline(gathered: Gathered, done: Study) -> str:
 
 
 def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidates, title: str) -> None:
-    """Write fleet.html.
-
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    candidates : Candidates
-        For their units.
-    title : str
-        Heading of the page.
-    """
+    """Write fleet.html. `candidates`: for their units; `title`: heading of the page."""
     units = display_units(gathered, candidates)
     kind = "bad" if done.people.out else "good"
     sentences = "<br>".join(prose(one) for one in tables.sentences(done, units))

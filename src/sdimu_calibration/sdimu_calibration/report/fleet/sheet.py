@@ -59,14 +59,8 @@ def write_page(
 ) -> None:
     """Write datasheet.html.
 
-    Parameters
-    ----------
-    path : Path
-        File to make or replace; its folder is made too.
-    entries : sequence of Entry
-        The results that it is made of.
-    certificate : bool
-        Of one unit: with its coefficients, the hashes of its recordings and room for signatures.
+    `entries`: the results that it is made of. `certificate`: of one unit: with its coefficients, the hashes of its
+    recordings and room for signatures.
     """
     imu = entries[0].result.origin.imu or "IMU"
     units = list(dict.fromkeys(entry.unit for entry in entries))

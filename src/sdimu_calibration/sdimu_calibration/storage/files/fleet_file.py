@@ -138,17 +138,8 @@ def _spread(name: str, found: RandomEffect) -> dict[str, Any]:
 def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapping[str, str]:
     """Write an IMU file with the priors of the population, without units that are out.
 
-    Parameters
-    ----------
-    path : Path
-        File to make or replace.
-    base : str
-        IMU by name or path: grade, noise, and priors of effects that the population does not know.
-
-    Returns
-    -------
-    mapping of str to str
-        The priors written, as in the file, by effect.
+    `base`: IMU by name or path: grade, noise, and priors of effects that the population does not know. Gives the priors
+    written, as in the file, by effect.
     """
     source = find_config("imu", base)
     if same_file(path, source):

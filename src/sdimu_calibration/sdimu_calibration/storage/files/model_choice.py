@@ -40,13 +40,7 @@ def model_word(word: str | None, handheld: bool) -> str:
 def named_model(word: str | None, added: Sequence[str], handheld: bool = False) -> Model:
     """Read the model that `word` means, with effects added; ``handheld`` means ``hand``.
 
-    Parameters
-    ----------
-    word : str or None
-        Name in config/model or path; None or empty takes the model for a table, or for a handheld run.
-    added : sequence of str
-        Effects to add.
-    handheld : bool
-        Moved by hand.
+    `word`: name in config/model or path; None or empty takes the model for a table, or for a handheld run. `added`:
+    effects to add. `handheld`: moved by hand.
     """
     return extended_model(model_word(word, handheld), added)

@@ -32,17 +32,8 @@ _RESPONSES = frozenset((*ACCEL_MISALIGNMENT.labels, *GYRO_MASS_UNBALANCE.labels,
 def read_reference(name_or_path: str | Path = "table33", mount: str = "1 deg") -> dict[str, float]:
     """Read published one-sigma errors.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name in config/reference/ or path.
-    mount : str
-        Which column: misalignment between IMU and table.
-
-    Returns
-    -------
-    dict of str to float
-        Sigma (SI) by effect name.
+    `name_or_path`: name in config/reference/ or path; `mount`: which column: misalignment between IMU and table. Gives
+    the sigma (SI) by effect name.
     """
     path = find_config("reference", name_or_path)
     columns = _columns(path)
