@@ -24,6 +24,8 @@ FLOATING = re.compile(r"\b(Floats|NDArray\[np\.float64\])")
 SHAPE = re.compile(r"(?i)\bshapes? \(|\blength [a-z]\b")
 PURE_NUMBER = re.compile(r"(?i)\b(share|ratio|factor|multiple|number|percentile|weight|probability|count)s?\b")
 BARE = re.compile(r"^\S[^\n]* : [^\n]*(\n(?!    )|\Z)", re.MULTILINE)
+PROPERTIES = {"property", "cached_property"}
+SECTION = re.compile(r"^\w+\n-+$", re.MULTILINE)
 UNIT = re.compile(r"\b(rad|m/s|deg|degC|Hz|SI|units?|dimensionless|whitened|normalised|customary)\b|\((s|m|g|1)\)")
 
 
@@ -114,14 +116,13 @@ def faults(one: Documented) -> Iterator[str]:
     given = ast.unparse(one.node.returns) if one.node.returns else ""
     if not ARRAY.search(given):
         return
-    if any(isinstance(d, ast.Name) and d.id == "property" for d in one.node.decorator_list):
+    if any(isinstance(d, ast.Name) and d.id in PROPERTIES for d in one.node.decorator_list):
         yield from () if SHAPE.search(one.doc) else ("a property that is an array: no shape",)
         return
     entries = one.sections["Returns"]
-    if not entries:
-        yield "no Returns section"
-    elif not any(SHAPE.search(text(entry)) for entry in entries):
-        yield "Returns: no shape"
+    said = [text(entry) for entry in entries] or [SECTION.split(one.doc)[0]]
+    if not any(SHAPE.search(words) for words in said):
+        yield "Returns: no shape" if entries else "no Returns section"
     elif FLOATING.search(given) and not UNIT.search(f"{one.doc}\n{one.module_doc}"):
         yield "Returns: no unit"
 
@@ -238,6 +239,17 @@ def test_a_method_inherits_the_sections_of_the_one_it_overrides(tmp_path):
         '    def own(self) -> Ints:\n        """Give another."""\n'
     )
     assert faults_of(tmp_path / "core.py") == ["Other.own: no Returns section"]
+
+
+def test_what_comes_back_may_be_said_in_a_sentence_with_its_shape(tmp_path):
+    (tmp_path / "__init__.py").touch()
+    (tmp_path / "core.py").write_text(
+        'def rate() -> Floats:\n    """Give the rate in b (rad/s), shape (n, 3)."""\n\n\n'
+        'def other() -> Floats:\n    """Give something of shape (n, 3)."""\n\n\n'
+        'def change(a: Floats) -> Ints:\n    """Change.\n\n    Parameters\n    ----------\n'
+        '    a : ndarray, shape (n,)\n        As read (rad).\n    """\n'
+    )
+    assert faults_of(tmp_path / "core.py") == ["other: Returns: no unit", "change: no Returns section"]
 
 
 def test_what_is_said_below_a_field_counts(tmp_path):

@@ -74,12 +74,9 @@ class LiveModel:
         return moved @ estimate, moved @ P @ moved.T
 
     def navigation_covariance(self, state: PassState) -> Floats:
-        """Read the covariance of the navigation errors; a free azimuth has what the Earth's rate leaves open of it.
+        """Read the covariance of position (m), velocity (m/s) and attitude (rad), shape (9, 9).
 
-        Returns
-        -------
-        ndarray, shape (9, 9)
-            Position (m), velocity (m/s), attitude (rad).
+        A free azimuth has what the Earth's rate leaves open of it.
         """
         P = state.P[:NAV, :NAV].copy()
         if self.azimuth_free:

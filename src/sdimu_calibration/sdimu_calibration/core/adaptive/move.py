@@ -69,10 +69,7 @@ class Move:
 def needed_of(known: Knowledge) -> Floats:
     """Say what is lacking at the last look to tell the open class apart.
 
-    Returns
-    -------
-    ndarray, shape (a,)
-        Differences of log Bayes factors (1), one for each look-alike; empty where no class is open.
+    Differences of log Bayes factors (1), one for each look-alike, shape (a,); empty where no class is open.
     """
     return np.zeros(0) if known.open is None else known.open.needed
 

@@ -92,13 +92,7 @@ def squares_count(sensors: ImuModel) -> bool:
 
 
 def scales_and_angles(sensors: ImuModel) -> Ints:
-    """List the places of scale factors and misalignments.
-
-    Returns
-    -------
-    ndarray of int, shape (k,)
-        Ascending.
-    """
+    """List the places of scale factors and misalignments, ascending, shape (k,)."""
     found = [i for i, p in enumerate(sensors.parameters) if p.unit in ("1", "rad") and _SCALE_OR_ANGLE.search(p.name)]
     return np.array(found, dtype=np.int64)
 

@@ -60,92 +60,51 @@ class Motion:
 
     @cached_property
     def left(self) -> dict[tuple[str, float], Floats]:
-        """What is remembered at the end of this block; `effects.memory` fills it in when an effect asks for it.
+        """What is remembered at the end of this block, as in `past` (g), each of shape (3,).
 
-        Returns
-        -------
-        dict of ndarray, shape (3,)
-            As in `past` (g).
+        `effects.memory` fills it in when an effect asks for it.
         """
         return {}
 
     @cached_property
     def a(self) -> Floats:
-        """Mean specific force.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            In b, in units of standard gravity (9.80665 m/s^2).
-        """
+        """Mean specific force in b, in units of standard gravity (9.80665 m/s^2), shape (n, 3)."""
         return self.f / STANDARD_GRAVITY
 
     @cached_property
     def a_rate(self) -> Floats:
-        """Rate of change of `a` while the IMU turns under gravity, ``-w_table x a``.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            In b (1/s, as `a` is in units of standard gravity).
-        """
+        """Rate of change of `a` in b while the IMU turns under gravity, ``-w_table x a`` (1/s), shape (n, 3)."""
         return np.asarray(-np.cross(self.w_table, self.a))
 
     @cached_property
     def table_rate(self) -> Floats:
-        """Magnitude of `w_table`.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            rad/s.
-        """
+        """Magnitude of `w_table` (rad/s), shape (n,)."""
         return np.asarray(np.linalg.norm(self.w_table, axis=1))
 
     @cached_property
     def standing(self) -> Ints:
-        """Cycles in which the table does not turn at all.
-
-        Returns
-        -------
-        ndarray of int, shape (k,)
-            Rows with `table_rate` exactly zero, in ascending order.
-        """
+        """Cycles in which the table does not turn at all, `table_rate` exactly zero, in ascending order, shape (k,)."""
         return np.flatnonzero(self.table_rate == 0.0)
 
     @cached_property
     def moving(self) -> Floats:
-        """Indicator of motion: 1 while the table turns, 0 at rest.
+        """Indicator of motion: 1 while the table turns, 0 at rest (dimensionless), shape (n,).
 
         `rest` is known by the epoch (1 s) only. Within an epoch the rate of the table says when a turn began or ended.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Dimensionless.
         """
         turning = np.sum(self.w_table**2, axis=1) > _TURNING**2
         return np.asarray((~self.rest & turning).astype(np.float64))
 
     @cached_property
     def field(self) -> Floats:
-        """Magnetic field that the sensors see.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            In b, in the unit of `magnetic_n` (T).
-        """
+        """Magnetic field that the sensors see, in b, in the unit of `magnetic_n` (T), shape (n, 3)."""
         return np.asarray(np.einsum("kij,i->kj", self.C_nb, self.magnetic_n))
 
     @cached_property
     def lever(self) -> Floats:
-        """Acceleration per lever arm of a point fixed in the body, ``[alpha x] + [w_table x]^2``.
+        """Acceleration per lever arm of a point fixed in the body, ``[alpha x] + [w_table x]^2``, shape (n, 3, 3).
 
-        Returns
-        -------
-        ndarray, shape (n, 3, 3)
-            In b (1/s^2, SI): a point at r (m) accelerates by ``lever @ r`` (m/s^2) against the centre of rotation.
+        In b (1/s^2, SI): a point at r (m) accelerates by ``lever @ r`` (m/s^2) against the centre of rotation.
         """
         w, d = self.w_table, self.alpha
         out = np.einsum("ki,kj->kij", w, w)

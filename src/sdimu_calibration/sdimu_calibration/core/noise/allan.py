@@ -62,12 +62,7 @@ def freedom_of(length: int, m: Floats) -> Floats:
 
 
 def factors(longest: int) -> Ints:
-    """Averaging factors for stretches of at most `longest` samples: powers of the square root of two.
-
-    Returns
-    -------
-    ndarray of int, shape (k,)
-    """
+    """Averaging factors for stretches of at most `longest` samples: powers of the square root of two, shape (k,)."""
     steps = np.arange(0.0, _PER_OCTAVE * np.log2(max(longest / 2.0, 1.0)) + 1e-9)
     return np.unique(np.rint(2.0 ** (steps / _PER_OCTAVE)).astype(np.int64))
 

@@ -52,12 +52,7 @@ def rests(recording: Recording) -> tuple[slice, ...]:
 
 
 def at_rest(recording: Recording) -> Bools:
-    """Find the samples about which the IMU rests for a second, and the table dwells where it says anything.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-    """
+    """Find the samples about which the IMU rests for a second, and the table dwells if it says anything, shape (n,)."""
     size = _window(recording)
     if len(recording.t) <= size:
         return np.zeros(len(recording.t), dtype=bool)

@@ -28,10 +28,7 @@ def stated_noise(imu: ImuSpecification) -> tuple[NoiseTerm, ...]:
 def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:
     """Covariance of the coefficients of a fit in noise of these terms, biases as means over the test.
 
-    Returns
-    -------
-    ndarray, shape (p, p)
-        Frame of the prior (SI).
+    Shape (p, p), in the frame of the prior (SI).
     """
     evidence = fit.bare
     return in_noise(fit, evidence, wander_in(evidence, terms), terms).settled_covariance

@@ -18,13 +18,7 @@ PARALLEL_RAD = 1e-9
 
 
 def unit(letter: str) -> Floats:
-    """Return the unit vector of an axis letter.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        A direction (1).
-    """
+    """Return the unit vector of an axis letter, a direction (1), shape (3,)."""
     vector = np.zeros(3)
     vector[AXES.index(letter)] = 1.0
     return vector
