@@ -13,6 +13,8 @@ With misalignments that are polynomials of the temperature the frame is that of 
 turn as a bias that follows the rate of the temperature. Estimators work in the frame at T0, where nothing but the prior
 holds that turn, and no square of it is lost; what they report is turned. A turn in the second power of the temperature
 is seen as a bias that follows ``(T - T0) dT/dt``, one in the third as one that follows ``(T - T0)^2 dT/dt``.
+
+Everywhere `names` are those of the p coefficients of a model, and `frame` is one of `FRAMES`.
 """
 
 from __future__ import annotations
@@ -95,11 +97,8 @@ def values_in_frame(names: Sequence[str], values: Floats, frame: str) -> Floats:
 
     Parameters
     ----------
-    names : sequence of str, length p
     values : ndarray, shape (..., p)
         In the frame of the prior, SI.
-    frame : str
-        One of `FRAMES`.
 
     Returns
     -------
@@ -132,7 +131,6 @@ def at_every_temperature(names: Sequence[str], values: Floats) -> Floats:
 
     Parameters
     ----------
-    names : sequence of str, length p
     values : ndarray, shape (..., p)
         In the accelerometers' frame at T0 (SI).
 
@@ -214,7 +212,6 @@ def temperature_jacobian(names: Sequence[str], values: Floats) -> Floats:
 
     Parameters
     ----------
-    names : sequence of str, length p
     values : ndarray, shape (p,)
         In the accelerometers' frame at T0 (SI).
 
@@ -246,9 +243,6 @@ def frame_jacobian(names: Sequence[str], frame: str, by_temperature: bool = True
 
     Parameters
     ----------
-    names : sequence of str, length p
-    frame : str
-        One of `FRAMES`.
     by_temperature : bool
         The frame at every temperature; else that at T0.
 
@@ -296,11 +290,8 @@ def jacobian_at(names: Sequence[str], values: Floats, frame: str) -> Floats:
 
     Parameters
     ----------
-    names : sequence of str, length p
     values : ndarray, shape (p,)
         In the frame of the prior, SI.
-    frame : str
-        One of `FRAMES`.
 
     Returns
     -------
@@ -360,8 +351,6 @@ def pinned_in(names: Sequence[str], frame: str = FRAMES[0]) -> tuple[str, ...]:
     """Coefficients of a model that a body frame makes zero by definition, powers of the temperature with them.
 
     None where the model cannot turn: it has not all of `pinned_names`.
-
-    `names`, length p: of the model; `frame`: one of `FRAMES`.
     """
     if frame == "prior" or not set(pinned_names()) <= set(names):
         return ()
@@ -369,17 +358,7 @@ def pinned_in(names: Sequence[str], frame: str = FRAMES[0]) -> tuple[str, ...]:
 
 
 def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> None:
-    """Refuse priors of coefficients that a body frame makes zero.
-
-    Parameters
-    ----------
-    stated : sequence of str
-        Coefficients whose prior a model states.
-    names : sequence of str, length p
-        Of the model.
-    frame : str
-        One of `FRAMES`.
-    """
+    """Refuse priors of coefficients that a body frame makes zero; `stated` are those whose prior a model states."""
     for name in set(stated) & set(pinned_in(names, frame)):
         raise DataError(
             f"priors.{name}: the body frame of the accelerometers makes it zero by definition: leave the line out"
@@ -387,10 +366,7 @@ def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> Non
 
 
 def turning_names(names: Sequence[str], frame: str) -> frozenset[str]:
-    """Coefficients whose values depend on the body frame: a prior of one is stated in the frame of the report.
-
-    `names`, length p: of the model; `frame`: one of `FRAMES`.
-    """
+    """Coefficients whose values depend on the body frame: a prior of one is stated in the frame of the report."""
     if not pinned_in(names, frame):
         return frozenset()
     powers = ("", *_BY_TEMPERATURE)
