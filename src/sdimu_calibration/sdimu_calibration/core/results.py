@@ -105,7 +105,6 @@ class SetRecording:
     serial: str
     power_on: str
     start_ns: int
-    """Stamp of its start."""
     temperature_degc: float
     """Mean; NaN where it is not recorded."""
     duration_s: float

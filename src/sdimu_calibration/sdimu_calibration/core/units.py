@@ -136,11 +136,6 @@ def parse_quantity(text: str | float, expected: str) -> float:
     expected : str
         A unit of the wanted dimension, for the check and the message.
 
-    Returns
-    -------
-    float
-        Value in SI.
-
     Raises
     ------
     UnitError

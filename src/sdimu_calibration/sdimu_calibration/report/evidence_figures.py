@@ -52,10 +52,6 @@ def deviates(
         What stands below the map and on its left.
     value : ndarray, shape (m, n)
         In sigma; NaN where nothing is known.
-    column, line : str
-        What a column and a line is.
-    height : int
-        Pixels.
     """
     numbered = len(columns) <= _MOST_NUMBERED
     text = [[cell(v) if numbered else sign(v) for v in row] for row in value]

@@ -72,12 +72,8 @@ def write_report(
 
     Parameters
     ----------
-    path : Path
-        File to make or replace; its folder is made too.
     calibration : Calibration
         Whose coefficients are shown; with a diagnosis usually `summary.diagnosis.after`.
-    title : str
-        Heading of the page.
     truth : mapping of str to float, optional
         True values (SI) by coefficient name, in the body frame of the calibration.
     reference : mapping of str to float, optional

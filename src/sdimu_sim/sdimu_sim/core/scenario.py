@@ -53,7 +53,6 @@ class Scenario:
     extras: Mapping[str, object] = field(default_factory=dict)
     """Other attributes of `ImuTruth` (lever arm, quantisation ...)."""
     start_ns: int = DEFAULT_START_NS
-    """Stamp of the start."""
 
     @property
     def reference_degc(self) -> float | None:

@@ -290,8 +290,6 @@ def compensate(
     ----------
     t : ndarray, shape (n,)
         End of each sample's interval (s since the start of the recording).
-    interval_s : float
-        Length of a sample's interval.
     omega_ib_b, f_ib_b : ndarray, shape (n, 3)
         As measured (rad/s, m/s^2).
     heat : (ndarray, ndarray), shape (n,) each, optional

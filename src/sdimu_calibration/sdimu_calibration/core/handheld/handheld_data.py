@@ -169,8 +169,6 @@ class Turns:
             Regressors of `seen` (SI).
         terms : sequence of (int, int), length m
             Sensor axis and parameter of each column.
-        count : int
-            Number of parameters.
 
         Returns
         -------

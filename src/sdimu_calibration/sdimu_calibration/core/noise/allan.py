@@ -30,7 +30,6 @@ class Allan:
     freedom: Floats
     """Equivalent degrees of freedom of the squares, for white noise, shape (k,)."""
     interval_s: float
-    """Sample interval."""
     lengths: tuple[int, ...]
     """Samples of each stretch."""
 
@@ -99,8 +98,6 @@ def allan(stretches: Sequence[Floats], interval_s: float) -> Allan:
     ----------
     stretches : sequence of ndarray, shape (n_i,)
         Samples at rest, each stretch without gaps.
-    interval_s : float
-        Sample interval.
     """
     m = factors(max(map(len, stretches)))
     total, pairs, freedom = np.zeros(len(m)), np.zeros(len(m)), np.zeros(len(m))

@@ -80,8 +80,6 @@ def size_of_residue(values: Floats, first: Ints, last: Ints, interval_s: float, 
         Rate or force (rad/s or m/s^2).
     first, last : ndarray of int, shape (k,)
         Samples ``first:last`` of each rest.
-    interval_s : float
-        Sample interval (s).
     white_noise : float
         Density of the specification (rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)).
 

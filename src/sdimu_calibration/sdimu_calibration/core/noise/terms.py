@@ -189,8 +189,6 @@ def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) ->
     ----------
     value : ndarray, shape (4,)
         Terms, with the units of `Terms.value`.
-    n : int
-        Number of samples.
     interval_s : float
         Time over which each sample is a mean.
 

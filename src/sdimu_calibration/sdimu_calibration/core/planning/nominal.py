@@ -56,8 +56,6 @@ def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
     ----------
     t : ndarray, shape (m,)
         Time after the start of the turn (s); any shape.
-    ramp_s : float
-        Length of each ramp.
 
     Returns
     -------

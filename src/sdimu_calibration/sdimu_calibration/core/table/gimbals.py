@@ -31,8 +31,6 @@ def axes_along(
 
     Parameters
     ----------
-    letter : str
-        Axis of the platform.
     angles : ndarray, shape (3,)
         Of outer, middle and inner axis (rad).
     axes : tuple of str

@@ -33,7 +33,6 @@ class Step:
     turn: Turn | None
     """Its axis is a platform axis (``X``, ``Y``, ``Z``) or the name of a joint; None only dwells."""
     dwell_s: float
-    """Length of the dwell (s)."""
     acceleration_rad_s2: float | None = None
     """Largest acceleration of the turn (rad/s^2); the limit of the axis when None."""
 
@@ -116,8 +115,6 @@ def is_possible(table: RateTable, angles: Floats, *steps: Step) -> bool:
     ----------
     angles : ndarray, shape (3,)
         Where the joints are (rad).
-    *steps : Step
-        What is to be done.
     """
     try:
         for step in steps:

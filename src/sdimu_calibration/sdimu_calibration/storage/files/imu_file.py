@@ -34,8 +34,6 @@ def write_measured_imu(
 
     Parameters
     ----------
-    path : Path
-        File to make or replace; its folder is made too.
     base : str
         IMU by name or path.
     measured : WhiteNoise

@@ -46,8 +46,6 @@ def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapp
 
     Parameters
     ----------
-    path : Path
-        File to make or replace.
     recording : str
         Name of the bag.
     duration_s : float
