@@ -13,7 +13,7 @@ from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.plan_search import Goal, NextTurn, Question, next_turn, search
 from sdimu_calibration.core.plan_search.bound import bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
-from sdimu_calibration.core.plan_search.within import within
+from sdimu_calibration.core.plan_search.search import within
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site

@@ -11,9 +11,11 @@ from dataclasses import dataclass, replace
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search.bound import Bounds, Question, bounds
 from sdimu_calibration.core.plan_search.moves import Abilities, single, whole
-from sdimu_calibration.core.plan_search.within import within
+from sdimu_calibration.core.planning.nominal import ramp_length
 from sdimu_calibration.core.recording import DataError
 
+_ROUNDING = 1e-9
+"""Tolerance (1) of a length: rounding of a sum."""
 _SLACK = 1e-6
 """Tolerance of comparisons (min, or share of a limit): rounding."""
 _WORTH_MIN = 0.05
@@ -124,6 +126,42 @@ def search(
                 going = True
                 break
     return replace(best, tried=tried)
+
+
+def within(start: Plan, able: Abilities, minutes: float) -> Plan:
+    """Shorten a plan until it fits: all stops and turns together, else one at a time, else as far as it goes.
+
+    `minutes`: time available. Gives the longest that fits of those with all stops and turns changed together; the
+    shortest where none fits; the start itself where it fits, or nothing shortens it.
+    """
+    limit = 60.0 * minutes * (1.0 + _ROUNDING)
+    if start.duration_s <= limit:
+        return start
+    together = [plan for plans in whole(start, able) for plan in plans if _runs(plan)]
+    fitting = [plan for plan in together if plan.duration_s <= limit]
+    if fitting:
+        return max(fitting, key=_length)
+    best = min([start, *together], key=_length)
+    while best.duration_s > limit:
+        shorter = min(filter(_runs, single(best, able)), key=_length, default=best)
+        if shorter.duration_s >= best.duration_s:
+            break
+        best = shorter
+    return best
+
+
+def _length(plan: Plan) -> float:
+    return plan.duration_s
+
+
+def _runs(plan: Plan) -> bool:
+    """Whether the acceleration suffices for all turns."""
+    try:
+        for number, turn in enumerate(plan.turns, start=1):
+            ramp_length(turn, plan.acceleration_rad_s2, number)
+    except DataError:
+        return False
+    return True
 
 
 def _check_limits(goal: Goal, first: Bounds) -> None:
