@@ -204,10 +204,7 @@ class StatedOpening(Reading, Stated):
     """How a recording is opened, as the options state it."""
 
     def read(self, handheld: bool | None) -> Opening:
-        """Read all of it, so that a wrong option is told before a long recording is read.
-
-        `handheld`: as `FitRequest.handheld`.
-        """
+        """Read all of it, so that a wrong option is told before a long recording is read."""
         from sdimu_calibration.storage.files.config import load_site
         from sdimu_calibration.storage.opening import Opening
 

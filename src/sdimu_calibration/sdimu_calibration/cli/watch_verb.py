@@ -166,10 +166,7 @@ class Pace:
 
 
 def watched(domain: int | None) -> RunningTest | None:
-    """Return the run of `sdimu` on this machine that is meant; None where none is, but perhaps another's test.
-
-    `domain`: as stated.
-    """
+    """Return the run of `sdimu` on this machine that is meant; None where none is, but perhaps another's test."""
     from sdimu_calibration.cli.processes import running_tests, stated_domain
     from sdimu_calibration.core.recording import DataError
 
