@@ -31,17 +31,12 @@ POLE_LIMIT = np.radians(89.9)
 
 @compiled
 def earth_rate(latitude: float) -> Floats:
-    """Earth rate in NED.
+    """Earth rate in NED (rad/s), shape (3,).
 
     Parameters
     ----------
     latitude : float
         Geodetic (rad).
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        rad/s.
     """
     w = np.zeros(3)
     w[0] = RATE * np.cos(latitude)

@@ -194,15 +194,10 @@ def origin_ns(stamps_ns: Ints) -> int:
 
 
 def seconds(stamps_ns: Ints, start_ns: int) -> Floats:
-    """Count stamps from a start.
+    """Count stamps from a start: seconds after `start_ns` (s), shape (n,).
 
     Parameters
     ----------
     stamps_ns : ndarray of int, shape (n,)
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Seconds after `start_ns` (s).
     """
     return np.asarray((stamps_ns - start_ns) * 1e-9, dtype=np.float64)

@@ -130,17 +130,12 @@ def _known(covariance: Floats, begin: int, end: int) -> Floats:
 
 
 def ratios(at: SoFar, goals: Goals, covariance: Floats) -> Floats:
-    """Sigma over limit in white noise.
+    """Sigma over limit in white noise (dimensionless), shape (..., c).
 
     Parameters
     ----------
     covariance : ndarray, shape (..., p, p)
         Of its parameters (SI).
-
-    Returns
-    -------
-    ndarray, shape (..., c)
-        Dimensionless.
     """
     frame = at.setup.model.body_frame
     limited, limit = goals.of(at.names[: at.own], frame)

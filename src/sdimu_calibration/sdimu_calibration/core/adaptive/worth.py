@@ -33,16 +33,12 @@ class Worth:
     """To all limits and to telling the class apart (nat), shape (k,)."""
 
     def reached(self, needed: Floats) -> Bools:
-        """Say which covariances leave nothing lacking.
+        """Say which covariances leave nothing lacking, shape (k,).
 
         Parameters
         ----------
         needed : ndarray, shape (a,)
             Difference of log Bayes factors that is lacking, as of `OpenClass` (1).
-
-        Returns
-        -------
-        ndarray of bool, shape (k,)
         """
         return np.asarray((self.ratio <= 1.0).all(axis=1) & (self.apart >= needed).all(axis=1))
 

@@ -229,17 +229,12 @@ def _reason(effect: Effect, key: str, has_temperature: bool, start_known: bool, 
 
 
 def slope_at_nought(model: ImuModel, coefficients: Floats) -> Floats:
-    """Return ``I + dE/dx`` at x = 0 by central differences: exact where E is affine in x.
+    """Return ``I + dE/dx`` at x = 0, rates first, shape (6, 6), by central differences: exact where E is affine.
 
     Parameters
     ----------
     coefficients : ndarray, shape (p,)
         SI.
-
-    Returns
-    -------
-    ndarray, shape (6, 6)
-        Rates first.
     """
     steps = np.diag([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
     ahead, behind = (_error(model, coefficients, sign * steps) for sign in (1.0, -1.0))
@@ -254,7 +249,7 @@ def _error(model: ImuModel, coefficients: Floats, x: Floats) -> Floats:
 
 
 def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, causal: bool) -> tuple[Floats, Floats]:
-    """Temperature difference and its rate, computed as in the calibration.
+    """Temperature difference (K) and its rate (K/s), computed as in the calibration, shape (n,) each.
 
     Parameters
     ----------
@@ -266,11 +261,6 @@ def heat_since(log: TemperatureLog | None, t: Floats, start_degc: float | None, 
         Temperature from which the difference counts (deg C); None for the origin of the log.
     causal : bool
         Use only what was measured up to t.
-
-    Returns
-    -------
-    temperature, rate : ndarray, shape (n,)
-        K, K/s.
     """
     about = log if log is None or start_degc is None else replace(log, reference_degc=start_degc)
     return temperatures(about, t, causal)

@@ -46,17 +46,12 @@ class AccelerometerFrameModel:
     """Shape (p,). Place of each parameter asked for among the inner ones; -1 for what is zero by definition."""
 
     def values(self, inner: Floats) -> Floats:
-        """Read the parameters asked for out of the inner ones.
+        """Read the parameters asked for out of the inner ones, shape (..., p); zero where the frame pins one.
 
         Parameters
         ----------
         inner : ndarray, shape (..., q)
             SI, in the accelerometers' frame.
-
-        Returns
-        -------
-        ndarray, shape (..., p)
-            SI, in the same frame; zero where the frame pins one.
         """
         return body_frame.at_every_temperature(self.asked.names, self._at_start(inner))
 
@@ -65,7 +60,7 @@ class AccelerometerFrameModel:
         return np.asarray(np.where(self.place >= 0, inner[..., np.maximum(self.place, 0)], 0.0))
 
     def covariance(self, inner: Floats, about: Floats) -> Floats:
-        """Read the covariance of the parameters asked for out of that of the inner ones.
+        """Read the covariance asked for out of that of the inner ones, shape (..., p, p); zero where pinned.
 
         Parameters
         ----------
@@ -73,11 +68,6 @@ class AccelerometerFrameModel:
             SI, in the accelerometers' frame.
         about : ndarray, shape (q,)
             The parameters themselves: covariances turn about them.
-
-        Returns
-        -------
-        ndarray, shape (..., p, p)
-            SI; rows and columns of pinned parameters are zero.
         """
         at, known = np.maximum(self.place, 0), self.place >= 0
         P = inner[..., at[:, None], at] * np.outer(known, known)

@@ -101,7 +101,7 @@ class ImuModel:
         return out
 
     def errors(self, values: Floats, coefficients: Floats) -> Floats:
-        """Sensor errors, measured minus true.
+        """Sensor errors in b, measured minus true: gyros (rad/s), then accelerometers (m/s^2), shape (n, 6).
 
         Parameters
         ----------
@@ -109,11 +109,6 @@ class ImuModel:
             As `regressors` gives them.
         coefficients : ndarray, shape (p,)
             SI.
-
-        Returns
-        -------
-        ndarray, shape (n, 6)
-            Gyros (rad/s), then accelerometers (m/s^2), in b.
         """
         return np.asarray(_errors(np.ascontiguousarray(values), self.channel, coefficients[self.parameter]))
 

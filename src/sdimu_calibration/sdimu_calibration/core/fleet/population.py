@@ -172,7 +172,7 @@ def within_units(fleet: Measured, k: int) -> RandomEffect | None:
 
 
 def unit_values(fleet: Measured, k: int, within: RandomEffect | None) -> tuple[Floats, Floats]:
-    """Combine the results of each unit.
+    """Combine the results of each unit: values and sigmas (SI) in the order of `Measured.units`, shape (u,) each.
 
     Parameters
     ----------
@@ -180,11 +180,6 @@ def unit_values(fleet: Measured, k: int, within: RandomEffect | None) -> tuple[F
         Coefficient.
     within : RandomEffect or None
         What results of one unit vary.
-
-    Returns
-    -------
-    values, sigmas : ndarray, shape (u,)
-        SI, in the order of `Measured.units`.
     """
     member = np.equal.outer(np.array(fleet.serials), np.array(fleet.units)).astype(float)
     more = 0.0 if within is None else within.spread**2

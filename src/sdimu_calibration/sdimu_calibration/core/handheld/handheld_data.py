@@ -161,7 +161,7 @@ class Turns:
     """Small turn in n per measured rate (rad/s) and force (m/s^2) of every cycle, shape (n, 3, 6)."""
 
     def by_parameter(self, run: HandheldRun, values: Floats, terms: Sequence[tuple[int, int]], count: int) -> Floats:
-        """Change of the attitudes per unit of some parameters.
+        """Change of the attitudes per unit of some parameters (rad), shape (k - 1, 3, count).
 
         Parameters
         ----------
@@ -169,11 +169,6 @@ class Turns:
             Regressors of `seen` (SI).
         terms : sequence of (int, int), length m
             Sensor axis and parameter of each column.
-
-        Returns
-        -------
-        ndarray, shape (k - 1, 3, count)
-            rad per unit of a parameter.
         """
         out = np.zeros((len(run.first), 3, count))
         for column, (channel, parameter) in enumerate(terms):

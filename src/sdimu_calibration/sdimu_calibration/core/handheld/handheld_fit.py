@@ -239,7 +239,7 @@ def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Fl
 
 
 def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) -> Floats:
-    """Sigma of every equation.
+    """Sigma of every equation in the unit of its residual (SI), shape (m,).
 
     Parameters
     ----------
@@ -247,11 +247,6 @@ def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) ->
         As `equations` gives it.
     extra : ndarray, shape (3,)
         Learned sigmas, as of `LinearisationPoint`.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        In the units of the residuals (SI).
     """
     white, more = _variances(run, scene, extra)
     return np.asarray(np.sqrt(_spread(run, kind, white + more)))

@@ -25,17 +25,12 @@ _UPRIGHT = 0.8
 
 
 def whole_turns(run: HandheldRun) -> Ints:
-    """Find the turns that may be whole ones about the vertical.
+    """Find the turns that may be whole ones about the vertical: which of the k - 1, shape (w,).
 
     Parameters
     ----------
     run : HandheldRun
         With k rests.
-
-    Returns
-    -------
-    ndarray of int, shape (w,)
-        Into the k - 1 turns.
     """
     up = run.mean[:, 3:] / np.linalg.norm(run.mean[:, 3:], axis=1, keepdims=True)
     bias = np.median(run.mean[:, :3], axis=0)

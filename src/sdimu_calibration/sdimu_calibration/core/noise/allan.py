@@ -40,7 +40,7 @@ class Allan:
 
 
 def freedom_of(length: int, m: Floats) -> Floats:
-    """Equivalent degrees of freedom of the overlapping Allan variance of white noise.
+    """Equivalent degrees of freedom of the overlapping Allan variance of white noise, shape (k,).
 
     Source: Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065 (2008), table 5, white FM.
 
@@ -50,10 +50,6 @@ def freedom_of(length: int, m: Floats) -> Floats:
         Samples of the stretch.
     m : ndarray, shape (k,)
         Averaging times (samples).
-
-    Returns
-    -------
-    ndarray, shape (k,)
     """
     n = float(length + 1)
     out = (3.0 * (n - 1.0) / (2.0 * m) - 2.0 * (n - 2.0) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0)
@@ -67,7 +63,7 @@ def factors(longest: int) -> Ints:
 
 
 def overlapping(samples: Floats, m: Ints) -> Floats:
-    """Overlapping Allan deviation of one stretch.
+    """Overlapping Allan deviation of one stretch in the unit of the samples, shape (k,).
 
     Source: Riley, *Handbook of Frequency Stability Analysis*, NIST SP 1065 (2008), eq. 11.
 
@@ -77,11 +73,6 @@ def overlapping(samples: Floats, m: Ints) -> Floats:
         Without gaps, any unit.
     m : ndarray of int, shape (k,)
         Averaging times (samples), each less than half of n.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        In the unit of the samples.
     """
     phase = np.concatenate([[0.0], np.cumsum(samples - samples.mean())])
     deviation = np.empty(len(m))

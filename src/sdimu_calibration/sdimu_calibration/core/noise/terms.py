@@ -67,33 +67,23 @@ class Terms:
         return np.asarray(self.value + _ROOM * self.sigma)
 
     def deviation(self, tau: Floats) -> Floats:
-        """Allan deviation of the terms that are seen.
+        """Allan deviation of the terms that are seen, in the unit of the channel, shape (k,).
 
         Parameters
         ----------
         tau : ndarray, shape (k,)
             Averaging times (s).
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            In the unit of the channel.
         """
         return np.asarray(np.sqrt(basis(tau) @ (self.value * self.seen) ** 2))
 
 
 def basis(tau: Floats) -> Floats:
-    """Variance per square of each term.
+    """Variance per square of each term, in the order of `TERMS` (1/s^2, 1/s, 1, s), shape (k, 4).
 
     Parameters
     ----------
     tau : ndarray, shape (k,)
         Averaging times (s).
-
-    Returns
-    -------
-    ndarray, shape (k, 4)
-        In the order of `TERMS` (1/s^2, 1/s, 1, s).
     """
     one = np.ones(len(tau))
     return np.column_stack([3.0 / tau**2, 1.0 / tau, 2.0 * np.log(2.0) / np.pi * one, tau / 3.0])
@@ -183,7 +173,7 @@ def _squares(found: Allan, among: Bools | None = None, misfit: float = 0.0) -> F
 
 
 def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) -> Floats:
-    """Simulate noise.
+    """Simulate noise in the unit of the channel, shape (n,).
 
     Parameters
     ----------
@@ -191,11 +181,6 @@ def drawn(value: Floats, n: int, interval_s: float, rng: np.random.Generator) ->
         Terms, with the units of `Terms.value`.
     interval_s : float
         Time over which each sample is a mean.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        In the unit of the channel.
     """
     Q, N, B, K = value
     edges = Q * rng.standard_normal(n + 1)

@@ -22,7 +22,7 @@ from sdimu_calibration.core.evidence.known import Known, data_information
 
 
 def together(known: Known | None, names: Sequence[str], prior: Floats, plan: Floats | None) -> Floats:
-    """Covariance of the coefficients of the unit after a plan, earlier data counted.
+    """Covariance of the coefficients of the unit after a plan (SI), earlier data counted, shape (p, p).
 
     Parameters
     ----------
@@ -33,11 +33,6 @@ def together(known: Known | None, names: Sequence[str], prior: Floats, plan: Flo
         Sigma of each before all data (SI).
     plan : ndarray, shape (p, p), or None
         Covariance that the data of the plan alone leave of the prior (SI); None: before it is run.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
-        SI.
     """
     p = len(prior)
     J = np.eye(p) if known is None else np.eye(p) + known.of(names, prior)

@@ -50,17 +50,12 @@ def ramp_length(turn: Turn, acceleration_rad_s2: float, number: int) -> float:
 
 
 def turned(t: Floats, turn: Turn, ramp_s: float) -> tuple[Floats, Floats]:
-    """Angle and rate of a turn; the angle is constant before and after it.
+    """Angle (rad) and rate (rad/s) of a turn, shape (m,) each; the angle is constant before and after it.
 
     Parameters
     ----------
     t : ndarray, shape (m,)
         Time after the start of the turn (s); any shape.
-
-    Returns
-    -------
-    angle, rate : ndarray, shape (m,)
-        rad, rad/s.
     """
     length = turn.duration_s
     peak = turn.angle_rad / (length - ramp_s)
