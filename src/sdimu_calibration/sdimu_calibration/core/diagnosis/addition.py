@@ -37,37 +37,25 @@ _MOST = 5
 
 @dataclass(frozen=True)
 class Addition:
-    """What the linear model says of an effect that is not added yet.
-
-    Attributes
-    ----------
-    labels : tuple of str, length k
-        Its parameters.
-    columns : ndarray of int, shape (k,)
-        Where they stand in the evidence.
-    estimate, sigma : ndarray, shape (k,)
-        SI.
-    held_out : tuple of (float, float)
-        Error at stops left out one by one (sigma), without it and with it.
-    raised : float
-        How many times it raises the sigma of the coefficient that suffers most.
-    alike : tuple of str
-        What the data cannot tell from its first parameter.
-    tells : Advice or None
-        The turn or stop that would tell them apart; None where nothing looks the same.
-    objections : tuple of str
-        What speaks against it, one line each.
-    """
+    """What the linear model says of an effect that is not added yet."""
 
     labels: tuple[str, ...]
+    """Its parameters, length k."""
     columns: Ints
+    """Where they stand in the evidence, shape (k,)."""
     estimate: Floats
     sigma: Floats
+    """`estimate`, `sigma`: SI, shape (k,)."""
     held_out: tuple[float, float]
+    """Error at stops left out one by one (sigma), without it and with it."""
     raised: float
+    """How many times it raises the sigma of the coefficient that suffers most."""
     alike: tuple[str, ...]
+    """What the data cannot tell from its first parameter."""
     tells: Advice | None
+    """The turn or stop that would tell them apart; None where nothing looks the same."""
     objections: tuple[str, ...]
+    """What speaks against it, one line each."""
 
 
 def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed: Ints) -> Addition:

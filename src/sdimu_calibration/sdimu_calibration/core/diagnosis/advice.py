@@ -30,15 +30,10 @@ _MOST_STAKES = 3
 
 @dataclass(frozen=True)
 class Untestable:
-    """Effects that could not have been seen, all for one reason.
-
-    Attributes
-    ----------
-    reason : str
-        Why not, and what would show them.
-    """
+    """Effects that could not have been seen, all for one reason."""
 
     reason: str
+    """Why not, and what would show them."""
     labels: tuple[str, ...]
 
 

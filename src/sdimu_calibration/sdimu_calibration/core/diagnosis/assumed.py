@@ -22,25 +22,18 @@ from sdimu_calibration.core.posterior.coefficients import drift_mean
 
 @dataclass(frozen=True)
 class Assumed:
-    """An effect that a coefficient takes to be absent.
-
-    Attributes
-    ----------
-    label, family : str
-        Of the effect: that of all which moves the coefficient most.
-    size : float
-        Size of the effect, if it is there: root mean square of what prior and data leave (SI).
-    sigmas : float
-        By how much the coefficient is off then (sigma).
-    """
+    """An effect that a coefficient takes to be absent."""
 
     coefficient: str
     label: str
     family: str
+    """`label`, `family`: Of the effect: that of all which moves the coefficient most."""
     size: float
+    """Size of the effect, if it is there: root mean square of what prior and data leave (SI)."""
     unit: str
     display_unit: str
     sigmas: float
+    """By how much the coefficient is off then (sigma)."""
 
 
 def assumed_absent(d: Diagnosis) -> tuple[Assumed, ...]:

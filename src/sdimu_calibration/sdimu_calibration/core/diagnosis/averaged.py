@@ -38,7 +38,20 @@ def over_all_models(base: Fit, done: Round) -> Fit:
 
 
 def none_below_zero(difference: Floats, sigma: Floats) -> Floats:
-    """Part of a difference of covariances (q, q) that is none below zero, in units of `sigma` (q,)."""
+    """Part of a difference of covariances that is below zero along no direction.
+
+    Parameters
+    ----------
+    difference : ndarray, shape (q, q)
+        SI.
+    sigma : ndarray, shape (q,)
+        Unit of each coefficient in which directions are compared (SI).
+
+    Returns
+    -------
+    ndarray, shape (q, q)
+        SI.
+    """
     unit = np.where(sigma > 0.0, sigma, 1.0)
     values, vectors = np.linalg.eigh(difference / np.outer(unit, unit))
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(unit, unit))

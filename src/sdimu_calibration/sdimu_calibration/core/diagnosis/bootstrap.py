@@ -21,28 +21,20 @@ from sdimu_calibration.core.progress import Progress
 
 @dataclass(frozen=True)
 class Null:
-    """What pure noise does.
-
-    Attributes
-    ----------
-    false_finds : int
-        Draws in which the search told an effect as found.
-    largest : ndarray, shape (draws,)
-        Largest ``|z|`` of the first scan of each draw (1).
-    threshold : float
-        Of the search in the recording (1).
-    rms_z : float
-        Of the first scans of all draws; 1 when the scores are calibrated.
-    free_input_p : ndarray, shape (draws,)
-        p-value of the free-input test of each draw, with nothing added; spread evenly over 0 to 1 when calibrated.
-    """
+    """What pure noise does."""
 
     draws: int
     false_finds: int
+    """Draws in which the search told an effect as found."""
     largest: Floats
+    """Largest ``|z|`` of the first scan of each draw (1), shape (draws,)."""
     threshold: float
+    """Of the search in the recording (1)."""
     rms_z: float
+    """Of the first scans of all draws; 1 when the scores are calibrated."""
     free_input_p: Floats
+    """Shape (draws,). p-value of the free-input test of each draw, with nothing added; spread evenly over 0 to 1 when
+    calibrated."""
 
     @property
     def sentence(self) -> str:

@@ -18,19 +18,13 @@ is."""
 
 @dataclass(frozen=True)
 class CoefficientShift:
-    """The coefficient that differs most when another member of the class takes the place of the one that was named.
-
-    Attributes
-    ----------
-    other : str
-        Label of the other member.
-    sigmas : float
-        Estimate with the other less estimate with the one that was named, in sigmas of the latter.
-    """
+    """The coefficient that differs most when another member of the class takes the place of the one that was named."""
 
     other: str
+    """Label of the other member."""
     coefficient: str
     sigmas: float
+    """Estimate with the other less estimate with the one that was named, in sigmas of the latter."""
 
 
 def coefficient_shifts(

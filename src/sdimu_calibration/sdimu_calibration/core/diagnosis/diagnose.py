@@ -58,56 +58,41 @@ NOT_DIAGNOSABLE = (
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What a diagnosis found.
-
-    Attributes
-    ----------
-    verdict : Verdict
-        Of a `survey`: consistent or misfit.
-    sentence : str
-        The verdict for people.
-    p_value : float
-        Probability that a right model in white noise looks like this, from scan, free inputs and NIS together.
-    noise : tuple of str
-        What is wrong with the noise model, one line each.
-    consistency : Consistency
-        Of the model as given.
-    fit, extended : Fit
-        With the model as given, and with what was found added; the latter with doubt about its model.
-    found : Search
-        Of the catalogue, or of own equations where those explain it.
-    free : ndarray of int, shape (f,)
-        Columns of the free inputs in `evidence`.
-    own : bool
-        What was found are own equations, not registered effects.
-    alarms : frozenset of Alarm
-        What speaks against a model that has all of this.
-    rungs : tuple of Rung
-        The fit as given and with each found effect added; empty where it was not asked for.
-    found_effects : tuple of Found
-        What was found, one at a time; when the verdict is ``unexplained`` what was tried.
-    """
+    """What a diagnosis found."""
 
     verdict: Verdict
+    """Of a `survey`: consistent or misfit."""
     sentence: str
+    """The verdict for people."""
     adequate: bool
     p_value: float
+    """Probability that a right model in white noise looks like this, from scan, free inputs and NIS together."""
     findings: tuple[Finding, ...]
     noise: tuple[str, ...]
+    """What is wrong with the noise model, one line each."""
     consistency: Consistency
+    """Of the model as given."""
     fit: Fit
     extended: Fit
+    """`fit`, `extended`: With the model as given, and with what was found added; the latter with doubt about its model.
+    """
     before: Calibration
     after: Calibration
     found: Search[LinearEvidence]
+    """Of the catalogue, or of own equations where those explain it."""
     evidence: LinearEvidence
     free_inputs_before: FreeInputTest
     free_inputs_after: FreeInputTest
     free: Ints
+    """Columns of the free inputs in `evidence`, shape (f,)."""
     own: bool
+    """What was found are own equations, not registered effects."""
     alarms: frozenset[Alarm]
+    """What speaks against a model that has all of this."""
     rungs: tuple[Rung, ...] = ()
+    """The fit as given and with each found effect added; empty where it was not asked for."""
     found_effects: tuple[Found, ...] = ()
+    """What was found, one at a time; when the verdict is ``unexplained`` what was tried."""
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:

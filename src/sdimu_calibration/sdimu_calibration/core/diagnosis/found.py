@@ -177,26 +177,19 @@ def catalogue_columns(d: Diagnosis) -> Ints:
 
 @dataclass(frozen=True)
 class DetectableSize:
-    """What this test could have seen of one effect that the model does not have.
-
-    Attributes
-    ----------
-    smallest : float
-        Size found with 80 % power at the threshold of a whole scan (SI); inf when the model takes all of it.
-    retention : float
-        Share of its signature that the model's coefficients leave.
-    partners : tuple of str
-        Coefficients of the model that take the rest; given when it is not testable.
-    """
+    """What this test could have seen of one effect that the model does not have."""
 
     label: str
     family: str
     unit: str
     display_unit: str
     smallest: float
+    """Size found with 80 % power at the threshold of a whole scan (SI); inf when the model takes all of it."""
     retention: float
+    """Share of its signature that the model's coefficients leave."""
     testable: bool
     partners: tuple[str, ...] = ()
+    """Coefficients of the model that take the rest; given when it is not testable."""
 
 
 def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:

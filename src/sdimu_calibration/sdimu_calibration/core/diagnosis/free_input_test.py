@@ -17,23 +17,16 @@ sigma more than ten times larger."""
 
 @dataclass(frozen=True)
 class FreeInputTest:
-    """Free-input test.
-
-    Attributes
-    ----------
-    chi2 : float
-        Fall of chi-square when every segment has its own constant sensor error.
-    estimate : ndarray, shape (f,)
-        The missing sensor error of each segment and sensor that fits best (minimum norm), SI.
-    z : ndarray, shape (f,)
-        Score of each alone.
-    """
+    """Free-input test."""
 
     chi2: float
+    """Fall of chi-square when every segment has its own constant sensor error."""
     dof: int
     p_value: float
     estimate: Floats
+    """The missing sensor error of each segment and sensor that fits best (minimum norm), SI, shape (f,)."""
     z: Floats
+    """Score of each alone, shape (f,)."""
 
 
 def free_input_test(full: Information, known: Ints, weight: Floats, free: Ints) -> FreeInputTest:

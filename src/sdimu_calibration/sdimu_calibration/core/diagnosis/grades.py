@@ -29,27 +29,18 @@ _MORE_THAN_ONE = 1.005
 
 @dataclass(frozen=True)
 class Graded:
-    """Something that is missing: an effect, or a class or family of which one is.
-
-    Attributes
-    ----------
-    words : str
-        The likeliest of it, with its size.
-    coefficient : str
-        Name of that in `may_be`.
-    size : str
-        Of the likeliest, with its sigma.
-    probability : float
-        That one of it is missing; NaN where no probabilities were worked out.
-    may_be : tuple of Share
-        What it may be, the likeliest first; one alone, or none, where it is told which.
-    """
+    """Something that is missing: an effect, or a class or family of which one is."""
 
     words: str
+    """The likeliest of it, with its size."""
     coefficient: str
+    """Name of that in `may_be`."""
     size: str
+    """Of the likeliest, with its sigma."""
     probability: float
+    """That one of it is missing; NaN where no probabilities were worked out."""
     may_be: tuple[Share, ...] = ()
+    """What it may be, the likeliest first; one alone, or none, where it is told which."""
 
     @property
     def certain(self) -> bool:

@@ -26,27 +26,18 @@ _PARALLEL = 1e-6
 
 @dataclass(frozen=True)
 class Request:
-    """What is searched for.
-
-    Attributes
-    ----------
-    base : Fit
-        With the model as given.
-    extra : tuple of Effect
-        The user's own effects, candidates like those of the catalogue.
-    alpha : float
-        False-alarm probability of a whole scan.
-    wander : Wander or None
-        How wandering biases would show in the test; None where the estimator learns scatter instead.
-    without : frozenset of str
-        Registry names of effects that are not tried.
-    """
+    """What is searched for."""
 
     base: Fit
+    """With the model as given."""
     extra: tuple[Effect, ...]
+    """The user's own effects, candidates like those of the catalogue."""
     alpha: float
+    """False-alarm probability of a whole scan."""
     wander: Wander | None = None
+    """How wandering biases would show in the test; None where the estimator learns scatter instead."""
     without: frozenset[str] = frozenset()
+    """Registry names of effects that are not tried."""
 
     def in_inner(self, evidence: LinearEvidence) -> LinearEvidence:
         """Return an evidence of white noise in what moves within the stretches of the test."""
@@ -55,22 +46,15 @@ class Request:
 
 @dataclass(frozen=True)
 class Ground:
-    """A fit with what was tried, and the evidence about it.
-
-    Attributes
-    ----------
-    fit : Fit
-        The model as given with `tried`.
-    evidence : LinearEvidence
-        `tried` is among its candidates.
-    free : ndarray of int, shape (f,)
-        Columns of the free inputs in `evidence`.
-    """
+    """A fit with what was tried, and the evidence about it."""
 
     fit: Fit
+    """The model as given with `tried`."""
     tried: tuple[Candidate, ...]
     evidence: LinearEvidence
+    """`tried` is among its candidates."""
     free: Ints
+    """Columns of the free inputs in `evidence`, shape (f,)."""
 
     @property
     def allowed(self) -> Ints:

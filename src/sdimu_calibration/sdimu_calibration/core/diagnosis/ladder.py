@@ -27,36 +27,26 @@ MOVED = 2.0
 
 @dataclass(frozen=True)
 class Rung:
-    """One model on the ladder.
-
-    Attributes
-    ----------
-    added : str
-        What this model has beyond the one before; empty for the first.
-    reason : str
-        Why it is refused; empty when accepted.
-    log_likelihood, log_bayes_factor, nis_mean, held_out_rms : float
-        Bayes factor against the rung before.
-    jump, jump_velocity : float
-        After turns: RMS of the velocity innovation at the first epoch of each stop, over its sigma and in m/s; NaN
-        where nothing is navigated.
-    moved : tuple of (str, float)
-        Coefficients that moved against the rung before, in their sigmas, largest first.
-    scatter : tuple of float, or None
-        What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle).
-    """
+    """One model on the ladder."""
 
     added: str
+    """What this model has beyond the one before; empty for the first."""
     accepted: bool
     reason: str
+    """Why it is refused; empty when accepted."""
     log_likelihood: float
     log_bayes_factor: float
     nis_mean: float
     held_out_rms: float
+    """`log_likelihood`, `log_bayes_factor`, `nis_mean`, `held_out_rms`: Bayes factor against the rung before."""
     jump: float
     jump_velocity: float
+    """`jump`, `jump_velocity`: After turns: RMS of the velocity innovation at the first epoch of each stop, over its
+    sigma and in m/s; NaN where nothing is navigated."""
     moved: tuple[tuple[str, float], ...]
+    """Coefficients that moved against the rung before, in their sigmas, largest first."""
     scatter: tuple[float, ...] | None = None
+    """What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle)."""
 
 
 def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:

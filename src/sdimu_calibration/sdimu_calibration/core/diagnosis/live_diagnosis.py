@@ -33,88 +33,58 @@ _FEWEST_STOPS = 2
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate beside the model as given.
-
-    Attributes
-    ----------
-    z : float
-        Estimate over sigma.
-    estimate, sigma : float
-        SI.
-    display_unit : str
-        Customary.
-    """
+    """A candidate beside the model as given."""
 
     label: str
     z: float
+    """Estimate over sigma."""
     estimate: float
     sigma: float
+    """`estimate`, `sigma`: SI."""
     display_unit: str
+    """Customary."""
 
 
 @dataclass(frozen=True)
 class ModelError:
-    """How large the error of a model is on the data so far.
-
-    Attributes
-    ----------
-    added : tuple of str
-        What it has beyond the model that the test began with.
-    held_out : float
-        RMS of the normalised errors at stops predicted from the others (1 is right); NaN with fewer than two stops.
-    nis : float
-        Normalised innovation squared per degree of freedom (1 is right).
-    """
+    """How large the error of a model is on the data so far."""
 
     added: tuple[str, ...]
+    """What it has beyond the model that the test began with."""
     held_out: float
+    """RMS of the normalised errors at stops predicted from the others (1 is right); NaN with fewer than two stops."""
     nis: float
+    """Normalised innovation squared per degree of freedom (1 is right)."""
 
 
 @dataclass(frozen=True)
 class LiveDiagnosis:
-    """What a diagnosis says of the data up to the end of a stop.
-
-    Attributes
-    ----------
-    stop : int
-        The last one.
-    until_s : float
-        Length of the data (s).
-    verdict : Verdict
-        ``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted; of a whole test that of `climb`.
-    sentence : str
-        The verdict for people; while it waits, for what.
-    added : tuple of str
-        Effects beyond the model that the test began with.
-    threshold : float
-        Size of the score (sigma) that pure noise reaches; inf where no candidate is testable.
-    p_value : float
-        Of what no candidate stands for.
-    where : tuple of StopMean
-        Every channel and stop, largest first.
-    ranking : tuple of Ranked
-        Every testable candidate, largest score first.
-    ladder : tuple of ModelError
-        Every model that this test has had, on the same data, the one in use last.
-    noise : tuple of str
-        What is wrong with the white noise of the IMU file, one line each.
-    probabilities : Probabilities or None
-        Of nothing, and of each family of effects; None before the test ends.
-    """
+    """What a diagnosis says of the data up to the end of a stop."""
 
     stop: int
+    """The last one."""
     until_s: float
+    """Length of the data (s)."""
     verdict: Verdict
+    """``consistent``, ``misfit``, or ``waiting`` where nothing could be fitted; of a whole test that of `climb`."""
     sentence: str
+    """The verdict for people; while it waits, for what."""
     added: tuple[str, ...] = ()
+    """Effects beyond the model that the test began with."""
     threshold: float = float("inf")
+    """Size of the score (sigma) that pure noise reaches; inf where no candidate is testable."""
     p_value: float = 1.0
+    """Of what no candidate stands for."""
     where: tuple[StopMean, ...] = ()
+    """Every channel and stop, largest first."""
     ranking: tuple[Ranked, ...] = ()
+    """Every testable candidate, largest score first."""
     ladder: tuple[ModelError, ...] = ()
+    """Every model that this test has had, on the same data, the one in use last."""
     noise: tuple[str, ...] = ()
+    """What is wrong with the white noise of the IMU file, one line each."""
     probabilities: Probabilities | None = None
+    """Of nothing, and of each family of effects; None before the test ends."""
 
     @property
     def standing(self) -> tuple[Ranked, ...]:

@@ -21,38 +21,26 @@ _RATES_DIFFER = 1.5
 
 @dataclass(frozen=True)
 class TurnSeen:
-    """One turn.
-
-    Attributes
-    ----------
-    axis : int or None
-        Body axis, 0-2; None when it turned about several.
-    angle, rate : float
-        Signed angle (rad); rate in the middle of the turn (rad/s).
-    """
+    """One turn."""
 
     after_stop: int
     axis: int | None
+    """Body axis, 0-2; None when it turned about several."""
     angle: float
     rate: float
+    """`angle`, `rate`: Signed angle (rad); rate in the middle of the turn (rad/s)."""
     minutes: float
 
 
 @dataclass(frozen=True)
 class PlanSeen:
-    """What a test did.
-
-    Attributes
-    ----------
-    oblique : int
-        Stops at which gravity lies between the body axes.
-    dwell_minutes : float
-        Median length of a stop.
-    """
+    """What a test did."""
 
     turns: tuple[TurnSeen, ...]
     oblique: int
+    """Stops at which gravity lies between the body axes."""
     dwell_minutes: float
+    """Median length of a stop."""
 
     def one_sided(self) -> tuple[tuple[str, int], ...]:
         """Axes about which all turns have one sense: letter and sign."""

@@ -42,24 +42,17 @@ cause."""
 
 @dataclass(frozen=True)
 class Round:
-    """One round.
-
-    Attributes
-    ----------
-    fit : Fit
-        About which this round is linear: the model with what the last round chose.
-    free : ndarray of int, shape (f,)
-        Columns of the free inputs in `evidence`.
-    left_before, left_after : FreeInputTest
-        What is left with nothing added, and with `found` added.
-    """
+    """One round."""
 
     fit: Fit
+    """About which this round is linear: the model with what the last round chose."""
     evidence: LinearEvidence
     free: Ints
+    """Columns of the free inputs in `evidence`, shape (f,)."""
     found: Search[LinearEvidence]
     left_before: FreeInputTest
     left_after: FreeInputTest
+    """`left_before`, `left_after`: What is left with nothing added, and with `found` added."""
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:

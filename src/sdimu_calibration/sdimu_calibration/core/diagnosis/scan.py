@@ -28,30 +28,21 @@ _JITTER = 1e-6
 
 @dataclass(frozen=True)
 class Scan:
-    """Scores of all candidates given a model.
-
-    Attributes
-    ----------
-    z : ndarray, shape (q,)
-        Estimate over sigma; 0 where not testable.
-    estimate, sigma : ndarray, shape (q,)
-        SI; sigma is inf where not testable.
-    retention : ndarray, shape (q,)
-        Share of the signature that the model leaves.
-    smallest : ndarray, shape (q,)
-        Minimal detectable size (SI).
-    J, d : ndarray, shape (q,)
-        Information on each parameter (1/sigma^2, SI) and the information vector, given the model: the estimate is
-        d / J.
-    """
+    """Scores of all candidates given a model."""
 
     z: Floats
+    """Shape (q,). Estimate over sigma; 0 where not testable."""
     estimate: Floats
     sigma: Floats
+    """`estimate`, `sigma`: Shape (q,). SI; sigma is inf where not testable."""
     retention: Floats
+    """Share of the signature that the model leaves, shape (q,)."""
     smallest: Floats
+    """Minimal detectable size (SI), shape (q,)."""
     J: Floats
     d: Floats
+    """`J`, `d`: Shape (q,). Information on each parameter (1/sigma^2, SI) and the information vector, given the model:
+    the estimate is d / J."""
 
 
 def scan(full: Information, known: Ints, weight: Floats) -> Scan:

@@ -12,25 +12,17 @@ _MISLEADING = frozenset({"stuck", "saturated"})
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault of the data.
-
-    Attributes
-    ----------
-    text : str
-        What it is.
-    grave : bool
-        Results cannot be trusted unless it is mended.
-    kind : str
-        As in `DataFault`; empty for what is no fault of samples.
-    start_s, end_s : float
-        Time of the first and the last sample (s).
-    """
+    """A fault of the data."""
 
     text: str
+    """What it is."""
     grave: bool
+    """Results cannot be trusted unless it is mended."""
     kind: str = ""
+    """As in `DataFault`; empty for what is no fault of samples."""
     start_s: float = float("nan")
     end_s: float = float("nan")
+    """`start_s`, `end_s`: Time of the first and the last sample (s)."""
 
 
 def screen(fit: Fit) -> tuple[Finding, ...]:

@@ -34,40 +34,27 @@ sensor, and moves nothing."""
 
 @dataclass(frozen=True)
 class Search(Generic[E]):
-    """What a search found.
-
-    Attributes
-    ----------
-    steps : tuple of Step
-        What was found, one at a time.
-    chosen : ndarray of int, shape (k,)
-        Columns of `evidence` that are told.
-    first : Scan
-        Before anything was added, of all columns.
-    evidence : LinearEvidence
-        With the finer variants that were chosen behind the candidates it had, in the noise that was learned.
-    noise : tuple of NoiseTerm
-        Noise with a memory.
-    white : LinearEvidence or None
-        The same evidence in white noise; None where that is what `evidence` is.
-    joint : Joint or None
-        Information on its columns and on wandering biases; None where noise was not learned.
-    stood : bool
-        The choice stood at the end; False where the search went to and fro and the last choice was taken.
-    posterior : Posterior or None
-        The models that the data leave probable; None where none was worked out.
-    """
+    """What a search found."""
 
     steps: tuple[Step, ...]
+    """What was found, one at a time."""
     chosen: Ints
+    """Columns of `evidence` that are told, shape (k,)."""
     first: Scan
+    """Before anything was added, of all columns."""
     threshold: float
     evidence: E
+    """With the finer variants that were chosen behind the candidates it had, in the noise that was learned."""
     noise: tuple[NoiseTerm, ...] = ()
+    """Noise with a memory."""
     white: E | None = None
+    """The same evidence in white noise; None where that is what `evidence` is."""
     joint: Joint | None = None
+    """Information on its columns and on wandering biases; None where noise was not learned."""
     stood: bool = True
+    """The choice stood at the end; False where the search went to and fro and the last choice was taken."""
     posterior: Posterior[E] | None = None
+    """The models that the data leave probable; None where none was worked out."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:

@@ -15,21 +15,7 @@ from sdimu_calibration.core.evidence.linear import E
 
 @dataclass(frozen=True)
 class Step:
-    """One rung of the ladder.
-
-    Attributes
-    ----------
-    z, threshold : float
-        Score beside those before it, and what noise reaches.
-    estimate, sigma : float
-        SI, with everything chosen up to this step.
-    held_out_gain, held_out_error : float
-        Log score over all stops, and its standard error.
-    alike : tuple of str
-        Labels of candidates that the data cannot tell from it.
-    moved : tuple of (str, float)
-        Coefficients of the model that were most wrong while it was missing: their errors, in their own sigmas.
-    """
+    """One rung of the ladder."""
 
     label: str
     family: str
@@ -37,16 +23,21 @@ class Step:
     display_unit: str
     z: float
     threshold: float
+    """`z`, `threshold`: Score beside those before it, and what noise reaches."""
     estimate: float
     sigma: float
+    """`estimate`, `sigma`: SI, with everything chosen up to this step."""
     log_likelihood_gain: float
     log_bayes_factor: float
     held_out_before: HeldOut
     held_out_after: HeldOut
     held_out_gain: float
     held_out_error: float
+    """`held_out_gain`, `held_out_error`: Log score over all stops, and its standard error."""
     alike: tuple[str, ...]
+    """Labels of candidates that the data cannot tell from it."""
     moved: tuple[tuple[str, float], ...] = field(default=())
+    """Coefficients of the model that were most wrong while it was missing: their errors, in their own sigmas."""
 
 
 def step_of(

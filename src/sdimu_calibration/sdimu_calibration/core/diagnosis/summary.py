@@ -16,29 +16,20 @@ from sdimu_calibration.core.verdict import Verdict
 
 @dataclass(frozen=True)
 class DiagnosisSummary:
-    """What people and files read of a diagnosis.
-
-    Attributes
-    ----------
-    found : tuple of Found
-        Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found.
-    reached : tuple of DetectableSize
-        Smallest detectable size of every candidate.
-    plan : PlanSeen or None
-        Turns and stops of the table; None for a handheld run.
-    untestable : tuple of Untestable
-        What could not have been seen, by reason.
-    assumed : tuple of Assumed
-        What would move a coefficient most, if it were there after all.
-    """
+    """What people and files read of a diagnosis."""
 
     diagnosis: Diagnosis
     found: tuple[Found, ...]
+    """Chosen effects; when the verdict is ``unexplained`` they are what was tried, not what was found."""
     reached: tuple[DetectableSize, ...]
+    """Smallest detectable size of every candidate."""
     plan: PlanSeen | None
+    """Turns and stops of the table; None for a handheld run."""
     untestable: tuple[Untestable, ...]
+    """What could not have been seen, by reason."""
     advice: tuple[Advice, ...]
     assumed: tuple[Assumed, ...] = ()
+    """What would move a coefficient most, if it were there after all."""
 
     @property
     def candidates(self) -> tuple[Found, ...]:

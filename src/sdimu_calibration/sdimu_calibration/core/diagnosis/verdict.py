@@ -40,17 +40,12 @@ _EQUATION = "Missing for certain, and fitted by"
 
 @dataclass(frozen=True)
 class Facts:
-    """What the verdict follows from.
-
-    Attributes
-    ----------
-    alike : tuple of str
-        What the data cannot tell from the first of them.
-    """
+    """What the verdict follows from."""
 
     found: Search[LinearEvidence]
     chosen: tuple[Candidate, ...]
     alike: tuple[str, ...]
+    """What the data cannot tell from the first of them."""
     findings: tuple[Finding, ...]
     noise: tuple[str, ...]
     own: bool

@@ -39,15 +39,10 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True)
 class AttitudeFunctions:
-    """Functions of the attitude, m of them.
-
-    Attributes
-    ----------
-    knots : ndarray, shape (m, 3)
-        Directions of force in b (1).
-    """
+    """Functions of the attitude, m of them."""
 
     knots: Floats
+    """Directions of force in b (1), shape (m, 3)."""
 
     def __len__(self) -> int:
         """Return the number of functions."""

@@ -30,21 +30,14 @@ _LEAST_SPAN_K = 1.0
 
 @dataclass(frozen=True)
 class Conditions:
-    """Means over s stretches.
-
-    Attributes
-    ----------
-    force : ndarray, shape (s, 3)
-        Direction of the specific force, in b, of unit length where the IMU stands (1).
-    rate : ndarray, shape (s, 3)
-        Body rate against the Earth, in b (rad/s).
-    temperature : ndarray, shape (s,)
-        T - T0 (K); zero where none is recorded.
-    """
+    """Means over s stretches."""
 
     force: Floats
+    """Direction of the specific force, in b, of unit length where the IMU stands (1), shape (s, 3)."""
     rate: Floats
+    """Body rate against the Earth, in b (rad/s), shape (s, 3)."""
     temperature: Floats
+    """Shape (s,). T - T0 (K); zero where none is recorded."""
 
     @property
     def followed(self) -> tuple[str, ...]:

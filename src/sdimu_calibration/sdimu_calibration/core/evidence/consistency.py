@@ -48,31 +48,22 @@ SLOW_S = 10
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of one triad against its specification, from differences of neighbouring epochs at rest.
-
-    Attributes
-    ----------
-    ratio : float
-        Measured over specified standard deviation, from the median of absolute differences (blind to outliers).
-    sigma : float
-        Standard error of `ratio`.
-    spread : float
-        Measured over specified standard deviation, outliers and all.
-    kurtosis : float
-        Of the differences; 3 is Gaussian.
-    slow : float
-        Scatter of neighbouring means over `SLOW_S` against that of seconds, 1 when the noise is white; NaN where the
-        stops are too short to tell.
-    outliers : ndarray of int, shape (o,)
-        Epochs that differ from both neighbours, to the same side, by more than four sigma of the difference.
-    """
+    """Noise of one triad against its specification, from differences of neighbouring epochs at rest."""
 
     ratio: float
+    """Measured over specified standard deviation, from the median of absolute differences (blind to outliers)."""
     sigma: float
+    """Standard error of `ratio`."""
     spread: float
+    """Measured over specified standard deviation, outliers and all."""
     kurtosis: float
+    """Of the differences; 3 is Gaussian."""
     outliers: Ints
+    """Epochs that differ from both neighbours, to the same side, by more than four sigma of the difference, shape (o,).
+    """
     slow: float = 1.0
+    """Scatter of neighbouring means over `SLOW_S` against that of seconds, 1 when the noise is white; NaN where the
+    stops are too short to tell."""
 
 
 NO_NOISE = Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
@@ -81,49 +72,33 @@ NO_NOISE = Noise(1.0, 1.0, 1.0, 3.0, np.empty(0, dtype=np.int64))
 
 @dataclass(frozen=True)
 class StopMean:
-    """How far a channel is off at a stop.
-
-    Attributes
-    ----------
-    channel : str
-        One of `CHANNEL_NAMES`; of a handheld run one of `handheld_evidence.CHANNELS`.
-    normalised_mean : float
-        Mean innovation over its sigma; standard normal when the model is right.
-    """
+    """How far a channel is off at a stop."""
 
     channel: str
+    """One of `CHANNEL_NAMES`; of a handheld run one of `handheld_evidence.CHANNELS`."""
     stop: int
     normalised_mean: float
+    """Mean innovation over its sigma; standard normal when the model is right."""
 
 
 @dataclass(frozen=True)
 class Consistency:
-    """Consistency of the innovations of the full filter.
-
-    Attributes
-    ----------
-    nis_mean : float
-        Normalised innovation squared per degree of freedom; 1 is right.
-    nis_p_value : float
-        Probability of a NIS as far from its mean, on either side, when the model is right.
-    first_nis : float
-        Mean NIS per degree of freedom at the first measurement of each stop: what the turns left.
-    ljung_box_p : float
-        Smallest p-value of the six sensor channels, times six.
-    where : tuple of StopMean
-        Every channel and stop, largest first.
-    seconds : int
-        Epochs that were measured.
-    """
+    """Consistency of the innovations of the full filter."""
 
     nis_mean: float
+    """Normalised innovation squared per degree of freedom; 1 is right."""
     nis_p_value: float
+    """Probability of a NIS as far from its mean, on either side, when the model is right."""
     first_nis: float
+    """Mean NIS per degree of freedom at the first measurement of each stop: what the turns left."""
     ljung_box_p: float
+    """Smallest p-value of the six sensor channels, times six."""
     gyro: Noise
     accel: Noise
     where: tuple[StopMean, ...]
+    """Every channel and stop, largest first."""
     seconds: int = 0
+    """Epochs that were measured."""
 
 
 def check(output: PassOutput, prepared: PreparedData, imu: ImuSpecification) -> Consistency:

@@ -33,23 +33,16 @@ _ANY_ATTITUDE = 1.0
 
 @dataclass(frozen=True)
 class HandheldEvidence(LinearEvidence):
-    """Evidence of a hand-held run; the model's parameters are its coefficients, the Earth's rate, attitudes.
-
-    Attributes
-    ----------
-    channel : ndarray of int, shape (N,)
-        Into `CHANNELS`.
-    rests : Motion
-        What a perfect IMU sees at the rests.
-    sigma : ndarray, shape (N,)
-        Sigma of each row before it was whitened (rad/s, m/s^2, rad for turns).
-    """
+    """Evidence of a hand-held run; the model's parameters are its coefficients, the Earth's rate, attitudes."""
 
     channel: Ints
+    """Into `CHANNELS`, shape (N,)."""
     run: HandheldRun
     rests: Motion
+    """What a perfect IMU sees at the rests."""
     gone: Turns
     sigma: Floats
+    """Sigma of each row before it was whitened (rad/s, m/s^2, rad for turns), shape (N,)."""
 
     @property
     def unpredictable(self) -> float:

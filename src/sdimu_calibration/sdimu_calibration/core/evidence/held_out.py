@@ -22,20 +22,14 @@ difference of nearly equal numbers has less than nine digits."""
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Prediction of every stop from the others.
-
-    Attributes
-    ----------
-    stop : ndarray of int, shape (s,)
-    log_score : ndarray, shape (s,)
-        Log predictive density of each stop.
-    rms : float
-        Of the normalised prediction errors of all stops; of rows that can be predicted at all.
-    """
+    """Prediction of every stop from the others."""
 
     stop: Ints
+    """Shape (s,)."""
     log_score: Floats
+    """Log predictive density of each stop, shape (s,)."""
     rms: float
+    """Of the normalised prediction errors of all stops; of rows that can be predicted at all."""
 
 
 def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Floats) -> HeldOut:

@@ -11,18 +11,12 @@ from sdimu_calibration.core.arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class Information:
-    """What data say about parameters; whoever estimates some of them states their prior information beside it.
-
-    Attributes
-    ----------
-    J : ndarray, shape (q, q)
-        Information (inverse covariance) matrix, in inverse units (SI) of two parameters.
-    d : ndarray, shape (q,)
-        Information vector, in inverse units; the estimate of parameter i alone is d_i / J_ii.
-    """
+    """What data say about parameters; whoever estimates some of them states their prior information beside it."""
 
     J: Floats
+    """Information (inverse covariance) matrix, in inverse units (SI) of two parameters, shape (q, q)."""
     d: Floats
+    """Shape (q,). Information vector, in inverse units; the estimate of parameter i alone is d_i / J_ii."""
 
     def given(self, known: Ints, weight: Floats) -> Information:
         """Information on all parameters when those at `known` are estimated along with them.

@@ -18,21 +18,14 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 
 @dataclass(frozen=True)
 class Joint:
-    """Information on parameters and wandering biases together.
-
-    Attributes
-    ----------
-    evidence : LinearEvidence
-        q columns.
-    wander : Wander
-        m signatures.
-    across : ndarray, shape (n, m)
-        Information across the first n columns of the evidence and the wander, where it is known.
-    """
+    """Information on parameters and wandering biases together."""
 
     evidence: LinearEvidence
+    """q columns."""
     wander: Wander
+    """m signatures."""
     across: Floats
+    """Information across the first n columns of the evidence and the wander, where it is known, shape (n, m)."""
 
     @classmethod
     def of(cls, evidence: LinearEvidence, wander: Wander, earlier: Joint | None = None) -> Joint:

@@ -23,24 +23,16 @@ _MOST_ALIKE = 3
 
 @dataclass(frozen=True)
 class Known:
-    """What data so far know of coefficients.
-
-    Attributes
-    ----------
-    names : tuple of str, length k
-        Coefficients, in the frame of the prior.
-    J : ndarray, shape (k, k)
-        Information of the data alone, without any prior (1/SI^2).
-    prior : ndarray, shape (k,)
-        Sigma before all data (SI); inf where there is none.
-    scatter : ndarray, shape (k,)
-        Sigma (SI) by which the coefficient is another one in the next recording; 0 where it is the same.
-    """
+    """What data so far know of coefficients."""
 
     names: tuple[str, ...]
+    """Coefficients, in the frame of the prior, length k."""
     J: Floats
+    """Information of the data alone, without any prior (1/SI^2), shape (k, k)."""
     prior: Floats
+    """Shape (k,). Sigma before all data (SI); inf where there is none."""
     scatter: Floats
+    """Shape (k,). Sigma (SI) by which the coefficient is another one in the next recording; 0 where it is the same."""
 
     def of(self, names: Sequence[str], prior: Floats) -> Floats:
         """Information on other coefficients: what they lack is estimated along, what is not known here is zero.
@@ -164,25 +156,17 @@ def data_information(covariance: Floats, prior: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a diagnosis has left a unit: what the next recording begins with.
-
-    Attributes
-    ----------
-    known : Known
-        Of the coefficients of the model, of what was found, and of what looks the same.
-    added : tuple of str
-        Labels of what was found or looks the same: what a model needs beyond the one given.
-    open : tuple of tuple of str
-        Classes that the data leave open: labels, that of the one found first.
-    imu, site : str
-        Their files as an option names them: names in config/ or paths.
-    """
+    """Where a diagnosis has left a unit: what the next recording begins with."""
 
     known: Known
+    """Of the coefficients of the model, of what was found, and of what looks the same."""
     added: tuple[str, ...] = ()
+    """Labels of what was found or looks the same: what a model needs beyond the one given."""
     open: tuple[tuple[str, ...], ...] = ()
+    """Classes that the data leave open: labels, that of the one found first."""
     imu: str = ""
     site: str = ""
+    """`imu`, `site`: Their files as an option names them: names in config/ or paths."""
 
 
 def class_of(found: Candidate, alike: Sequence[Candidate]) -> tuple[Candidate, ...]:

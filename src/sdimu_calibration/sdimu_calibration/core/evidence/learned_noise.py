@@ -59,47 +59,31 @@ _TAUS = 8
 
 @dataclass(frozen=True)
 class Modes:
-    """Independent modes of noise with a memory, r of unit variance.
-
-    Attributes
-    ----------
-    columns : ndarray, shape (N, r)
-        Signatures in the whitened residuals.
-    mean : ndarray, shape (6, r)
-        What each mode adds to the mean error of each sensor over all dwells (SI).
-    unseen : ndarray, shape (6, 6)
-        Covariance of these means by modes of which the data say nothing (SI). A bias of an accelerometer that the
-        tilt takes up in most attitudes wanders there all the same.
-    """
+    """Independent modes of noise with a memory, r of unit variance."""
 
     columns: Floats
+    """Signatures in the whitened residuals, shape (N, r)."""
     mean: Floats
+    """What each mode adds to the mean error of each sensor over all dwells (SI), shape (6, r)."""
     unseen: Floats
+    """Shape (6, 6). Covariance of these means by modes of which the data say nothing (SI). A bias of an accelerometer
+    that the tilt takes up in most attitudes wanders there all the same."""
 
 
 @dataclass(frozen=True)
 class Wander:
-    """How wandering biases of the six sensors would show in a test.
-
-    Attributes
-    ----------
-    cut : Stretches
-        n cells.
-    U : ndarray, shape (N, 6 n)
-        Signatures; column ``6 cell + channel``.
-    learned : tuple of NoiseTerm or None
-        Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked.
-    inner : InnerNoise or None
-        In which U is whitened, and an evidence must be that goes with it.
-    plain : Wander or None
-        The same in white noise, where there is an `inner`.
-    """
+    """How wandering biases of the six sensors would show in a test."""
 
     cut: Stretches
+    """n cells."""
     U: Floats
+    """Shape (N, 6 n). Signatures; column ``6 cell + channel``."""
     learned: tuple[NoiseTerm, ...] | None = None
+    """Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked."""
     inner: InnerNoise | None = None
+    """In which U is whitened, and an evidence must be that goes with it."""
     plain: Wander | None = None
+    """The same in white noise, where there is an `inner`."""
 
     @property
     def in_white(self) -> Wander:
@@ -187,19 +171,14 @@ class Wander:
 
 @dataclass(frozen=True)
 class NoiseInformation:
-    """Information on the mean errors in all stretches, the known parameters estimated along.
-
-    Attributes
-    ----------
-    J : ndarray, shape (6 n, 6 n)
-    d : ndarray, shape (6 n,)
-    fitted : float
-        Log-likelihood that the known parameters add, with white noise alone.
-    """
+    """Information on the mean errors in all stretches, the known parameters estimated along."""
 
     J: Floats
+    """Shape (6 n, 6 n)."""
     d: Floats
+    """Shape (6 n,)."""
     fitted: float
+    """Log-likelihood that the known parameters add, with white noise alone."""
 
     def block(self, row: str, column: str) -> Floats:
         """Cut out the information across two triads, stretch by axis.
@@ -362,18 +341,12 @@ def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTe
 
 @dataclass(frozen=True)
 class InModes:
-    """Information on the modes of a kind of noise of unit size, r of them, in each sensor of a triad.
-
-    Attributes
-    ----------
-    J : ndarray, shape (3 r, 3 r)
-        Mode by axis (1).
-    d : ndarray, shape (3 r,)
-        (1).
-    """
+    """Information on the modes of a kind of noise of unit size, r of them, in each sensor of a triad."""
 
     J: Floats
+    """Mode by axis (1), shape (3 r, 3 r)."""
     d: Floats
+    """(1), shape (3 r,)."""
 
     @classmethod
     def of(cls, J: Floats, d: Floats, cut: Stretches, kind: str, tau: float) -> InModes:

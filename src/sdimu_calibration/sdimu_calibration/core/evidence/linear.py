@@ -36,55 +36,40 @@ class LinearEvidence(ABC):
     """Whitened residuals ``e = W theta + white noise``, theta the deviation from the calibration.
 
     Noise with a memory that was learned stands beside: ``e = W theta + noise u + white noise``, u of unit variance.
-
-    Attributes
-    ----------
-    e : ndarray, shape (N,)
-        Whitened residuals with all parameters at the calibration's values.
-    W : ndarray, shape (N, p + q)
-        Signatures, whitened residual per SI unit: p parameters of the model, then q candidates.
-    stop : ndarray of int, shape (N,)
-        Number of the stop that each row belongs to: rows of one stop are left out together.
-    names : tuple of str
-        Of the p + q parameters.
-    weight : ndarray, shape (p,)
-        Prior information of the model's parameters (1/sigma^2).
-    shift : ndarray, shape (p,)
-        Prior mean minus the calibration's values.
-    stated : ndarray, shape (p,)
-        One-sigma of the model's parameters by the specification, whatever the calibration had to widen it to.
-    candidates : tuple of Candidate, length q
-    prior : ndarray, shape (q,)
-        One-sigma that physics gives the candidates (inf where unknown).
-    imu : ImuSpecification
-        Gives candidates their prior.
-    times : Timetable
-        When the recording stood and turned.
-    coefficients : int
-        How many of the model's parameters, the first ones, are sensor coefficients.
-    noise : ndarray, shape (N, r)
-        Signatures of the modes of noise with a memory.
-    inner : InnerNoise or None
-        Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there.
-    worked_out : Information or None
-        `information`, where whoever makes the evidence knows it more cheaply; evidence made from this one has its own.
     """
 
     e: Floats
+    """Whitened residuals with all parameters at the calibration's values, shape (N,)."""
     W: Floats
+    """Shape (N, p + q). Signatures, whitened residual per SI unit: p parameters of the model, then q candidates."""
     stop: Ints
+    """Shape (N,). Number of the stop that each row belongs to: rows of one stop are left out together."""
     names: tuple[str, ...]
+    """Of the p + q parameters."""
     weight: Floats
+    """Prior information of the model's parameters (1/sigma^2), shape (p,)."""
     shift: Floats
+    """Prior mean minus the calibration's values, shape (p,)."""
     stated: Floats
+    """One-sigma of the model's parameters by the specification, whatever the calibration had to widen it to,
+    shape (p,)."""
     candidates: tuple[Candidate, ...]
+    """Length q."""
     prior: Floats
+    """One-sigma that physics gives the candidates (inf where unknown), shape (q,)."""
     imu: ImuSpecification
+    """Gives candidates their prior."""
     times: Timetable
+    """When the recording stood and turned."""
     coefficients: int
+    """How many of the model's parameters, the first ones, are sensor coefficients."""
     noise: Floats = field(default_factory=lambda: np.zeros((0, 0)), kw_only=True)
+    """Signatures of the modes of noise with a memory, shape (N, r)."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
+    """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
+    """`information`, where whoever makes the evidence knows it more cheaply; evidence made from this one has its own.
+    """
 
     def __post_init__(self, worked_out: Information | None) -> None:
         """Keep the information that is known."""

@@ -49,40 +49,27 @@ megabytes."""
 
 @dataclass(frozen=True)
 class KnownPass:
-    """A navigation with the coefficients known.
-
-    Attributes
-    ----------
-    output : PassOutput
-        With the matrices of every epoch.
-    seen : Motion
-        Motion along which it was linearised, n cycles.
-    weight : ndarray, shape (n, 6, 6), or None
-        Change of corrected rate and force per change of the measured ones; None is the identity.
-    """
+    """A navigation with the coefficients known."""
 
     output: PassOutput
+    """With the matrices of every epoch."""
     seen: Motion
+    """Motion along which it was linearised, n cycles."""
     weight: Floats | None
+    """Shape (n, 6, 6). Change of corrected rate and force per change of the measured ones; None is the identity."""
 
 
 @dataclass(frozen=True)
 class NavigationEvidence(LinearEvidence):
-    """Innovations of the navigation filter about a converged calibration; every parameter of the model a coefficient.
-
-    Attributes
-    ----------
-    epoch, channel : ndarray of int, shape (N,)
-        Of each row; channels 0-11 are position, velocity, rate, force, three each.
-    latitude : float
-        Of the site (rad).
-    """
+    """Innovations of the navigation filter about a calibration that converged; every parameter is a coefficient."""
 
     epoch: Ints
     channel: Ints
+    """`epoch`, `channel`: Shape (N,). Of each row; channels 0-11 are position, velocity, rate, force, three each."""
     known: KnownPass
     prepared: PreparedData
     latitude: float
+    """Of the site (rad)."""
 
     @property
     def output(self) -> PassOutput:

@@ -43,27 +43,20 @@ class Stretches:
     """Stretches of a test, n of them, in the order of time; m functions of the attitude may stand behind them.
 
     A cell is a stretch with a constant error, or a function of the attitude with its weight.
-
-    Attributes
-    ----------
-    start, end : ndarray, shape (n,)
-        s.
-    interval : ndarray of int, shape (n,)
-        Number of the dwell or turn that a stretch is part of.
-    turning : ndarray of bool, shape (n,)
-    conditions : Conditions or None
-        What an unknown error may follow; None where nobody knows it.
-    functions : AttitudeFunctions or None
-        m of them, which make up an unknown function of the attitude; None where that is taken as its mean over each
-        stretch.
     """
 
     start: Floats
     end: Floats
+    """`start`, `end`: s, shape (n,)."""
     interval: Ints
+    """Number of the dwell or turn that a stretch is part of, shape (n,)."""
     turning: Bools
+    """Shape (n,)."""
     conditions: Conditions | None = None
+    """What an unknown error may follow; None where nobody knows it."""
     functions: AttitudeFunctions | None = None
+    """m of them, which make up an unknown function of the attitude; None where that is taken as its mean over each
+    stretch."""
     _modes: dict[tuple[str, float], Floats] = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self) -> int:

@@ -93,35 +93,23 @@ def _add_weighed_columns(
 
 
 class Epochs(NamedTuple):
-    """Epochs, as in `filter_pass.PassInput`.
-
-    Attributes
-    ----------
-    first, last : ndarray of int, shape (e,)
-        Cycles from `first` to before `last`.
-    kind : ndarray of int, shape (e,)
-        What each measures.
-    """
+    """Epochs, as in `filter_pass.PassInput`."""
 
     first: Ints
     last: Ints
+    """`first`, `last`: Cycles from `first` to before `last`, shape (e,)."""
     kind: Ints
+    """What each measures, shape (e,)."""
 
 
 class Regressors(NamedTuple):
-    """Regressors of parameters.
-
-    Attributes
-    ----------
-    values : ndarray, shape (n, m)
-        Columns, of n cycles.
-    channel, parameter : ndarray of int, shape (m,)
-        Sensor axis and parameter of each column.
-    """
+    """Regressors of parameters."""
 
     values: Floats
+    """Columns, of n cycles, shape (n, m)."""
     channel: Ints
     parameter: Ints
+    """`channel`, `parameter`: Sensor axis and parameter of each column, shape (m,)."""
 
 
 class _Cycles(NamedTuple):

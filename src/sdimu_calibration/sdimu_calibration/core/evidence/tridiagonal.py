@@ -27,21 +27,14 @@ _HALVINGS = 40
 
 @dataclass(frozen=True)
 class Tridiagonal:
-    """Information on m modes and on what they pull, turned until the modes are a chain that begins at the pull.
-
-    Attributes
-    ----------
-    own : ndarray, shape (m,)
-        Diagonal of T (1).
-    beside : ndarray, shape (m - 1,)
-        What stands beside it (1).
-    pull2 : float
-        Square of the information vector (1).
-    """
+    """Information on m modes and on what they pull, turned until the modes are a chain that begins at the pull."""
 
     own: Floats
+    """Diagonal of T (1), shape (m,)."""
     beside: Floats
+    """What stands beside it (1), shape (m - 1,)."""
     pull2: float
+    """Square of the information vector (1)."""
 
     @classmethod
     def of(cls, J: Floats, d: Floats) -> Tridiagonal:

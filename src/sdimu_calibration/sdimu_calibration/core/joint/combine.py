@@ -22,17 +22,12 @@ from sdimu_calibration.core.joint.reduction import Reduction
 
 @dataclass(frozen=True)
 class Rows:
-    """Data equations of a power-on in the parameters of the set.
-
-    Attributes
-    ----------
-    A : ndarray, shape (k, P)
-        Change of each row (1) per SI unit.
-    y : ndarray, shape (k,)
-    """
+    """Data equations of a power-on in the parameters of the set."""
 
     A: Floats
+    """Change of each row (1) per SI unit, shape (k, P)."""
     y: Floats
+    """Shape (k,)."""
 
 
 def spread_out(reduction: Reduction, names: Sequence[str]) -> Rows:
@@ -58,40 +53,28 @@ def stacked(rows: Sequence[Rows]) -> Rows:
 
 @dataclass(frozen=True)
 class Component:
-    """Coefficients that differ from power-on to power-on with one variance.
-
-    Attributes
-    ----------
-    effect : str
-        Name of the effect.
-    columns : ndarray of int, shape (v,)
-        Places of its coefficients among the parameters of the set.
-    """
+    """Coefficients that differ from power-on to power-on with one variance."""
 
     effect: str
+    """Name of the effect."""
     columns: Ints
+    """Places of its coefficients among the parameters of the set, shape (v,)."""
 
 
 @dataclass(frozen=True)
 class JointEstimate:
-    """Estimate of a set.
-
-    Attributes
-    ----------
-    values : ndarray, shape (P,)
-        SI; of a coefficient that varies the mean over all power-ons that might be.
-    covariance : ndarray, shape (P, P)
-    deviation, deviation_sigma : ndarray, shape (G, v)
-        Of each power-on from `values` (SI), in the order of the columns that vary, and their sigmas.
-    log_likelihood : float
-        Restricted: the parameters of the set are integrated over their priors.
-    """
+    """Estimate of a set."""
 
     values: Floats
+    """Shape (P,). SI; of a coefficient that varies the mean over all power-ons that might be."""
     covariance: Floats
+    """Shape (P, P)."""
     deviation: Floats
     deviation_sigma: Floats
+    """`deviation`, `deviation_sigma`: Of each power-on from `values` (SI), in the order of the columns that vary, and
+    their sigmas, shape (G, v)."""
     log_likelihood: float
+    """Restricted: the parameters of the set are integrated over their priors."""
 
 
 class Combination:

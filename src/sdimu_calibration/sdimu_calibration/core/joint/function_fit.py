@@ -35,27 +35,18 @@ _LEARNINGS = 2
 
 @dataclass(frozen=True)
 class Beside:
-    """A joint fit beside a function.
-
-    Attributes
-    ----------
-    fit : SetFit
-        With the estimate beside the function.
-    reports : tuple of Report
-        Rows with the weights.
-    shared : SharedFunction or None
-        None where there is none: then the estimate is that without.
-    gain : float
-        Log-likelihood that the function adds (1).
-    unknown : tuple of UnknownFunction
-        The function at all stops, one a triad.
-    """
+    """A joint fit beside a function."""
 
     fit: SetFit
+    """With the estimate beside the function."""
     reports: tuple[Report, ...] = ()
+    """Rows with the weights."""
     shared: SharedFunction | None = None
+    """None where there is none: then the estimate is that without."""
     gain: float = 0.0
+    """Log-likelihood that the function adds (1)."""
     unknown: tuple[UnknownFunction, ...] = ()
+    """The function at all stops, one a triad."""
 
 
 def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> Beside:

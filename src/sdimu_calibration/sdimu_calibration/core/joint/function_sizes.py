@@ -24,24 +24,16 @@ _RATIOS = np.geomspace(1e-3, 1e4, 57)
 
 @dataclass(frozen=True)
 class FunctionSizes:
-    """What a set says of the sizes of a function.
-
-    Attributes
-    ----------
-    shared : SharedFunction
-        Its sizes do not matter.
-    seen : dict of str to float
-        Size at which the function of a sensor is seen at all (SI).
-    of_weights : Information
-        On the weights, each over the size at which it is seen; coefficients and deviations integrated.
-    constant : float
-        What the log-likelihood has beside that of the weights (1).
-    """
+    """What a set says of the sizes of a function."""
 
     shared: SharedFunction
+    """Its sizes do not matter."""
     seen: dict[str, float]
+    """Size at which the function of a sensor is seen at all (SI)."""
     of_weights: Information
+    """On the weights, each over the size at which it is seen; coefficients and deviations integrated."""
     constant: float
+    """What the log-likelihood has beside that of the weights (1)."""
 
     @property
     def least(self) -> dict[str, float]:

@@ -41,25 +41,19 @@ _ALIKE = 0.5
 
 @dataclass(frozen=True)
 class Leftovers:
-    """Scores of all leftovers, m of them; units such that the information on a sensor's error is one in the mean.
-
-    Attributes
-    ----------
-    score : ndarray, shape (m,)
-    gram : ndarray, shape (m, m)
-        Covariance of the scores under the model.
-    sensor : ndarray of int, shape (m,)
-        Into `CHANNELS`.
-    recording : ndarray of int, shape (m,)
-    likeness : mapping of str to ndarray, shape (m, m)
-        By kind: 1 where two leftovers are of one attitude (time, temperature), 0 where nothing is common.
-    """
+    """Scores of all leftovers, m of them; units such that the information on a sensor's error is one in the mean."""
 
     score: Floats
+    """Shape (m,)."""
     gram: Floats
+    """Covariance of the scores under the model, shape (m, m)."""
     sensor: Ints
+    """Into `CHANNELS`, shape (m,)."""
     recording: Ints
+    """Shape (m,)."""
     likeness: Mapping[str, Floats]
+    """Shape (m, m). By kind: 1 where two leftovers are of one attitude (time, temperature), 0 where nothing is common.
+    """
 
     def only(self, keep: Ints) -> Leftovers:
         """Return some of the leftovers.

@@ -40,129 +40,91 @@ coefficient shows by half a percent."""
 
 @dataclass(frozen=True)
 class Member:
-    """A recording of a set.
-
-    Attributes
-    ----------
-    name : str
-        What the user calls the recording; no other of the set has it.
-    open : callable
-        ``() -> PreparedTest``; another process can call it too.
-    serial, power_on : str
-        Of the unit, and from which switching-on; empty power-on: one of its own.
-    """
+    """A recording of a set."""
 
     name: str
+    """What the user calls the recording; no other of the set has it."""
     open: Callable[[], PreparedTest]
+    """``() -> PreparedTest``; another process can call it too."""
     serial: str = ""
     power_on: str = ""
+    """`serial`, `power_on`: Of the unit, and from which switching-on; empty power-on: one of its own."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be done with a recording.
-
-    Attributes
-    ----------
-    model : Model
-        With the effects that were found in all recordings.
-    local : tuple of str
-        Keys of effects of this recording alone, in the model behind the others. What all have of them it has not: its
-        own value stands in the place of theirs.
-    candidates : tuple of str or Effect
-        Effects whose signatures are wanted.
-    with_local : bool
-        Also those of effects that are of one recording.
-    stretches : bool
-        Signatures of an error of each sensor in each dwell and turn, in place of candidates.
-    function : SharedFunction or None
-        Signatures of functions of the attitude in place of candidates, in noise that is learned beside them.
-    about : mapping of str to float or None
-        Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit.
-    imu : ImuSpecification or None
-        With the noise that the recording shows, where it is known.
-    start : Start or None
-        Where an earlier fit of the recording ended: gives the attitude.
-    noise : tuple of NoiseTerm or None
-        Noise with a memory, where it is known; None learns it.
-    rivals : bool
-        Also what the recording says in each noise that it may have.
-    """
+    """What is to be done with a recording."""
 
     member: Member
     model: Model
+    """With the effects that were found in all recordings."""
     estimator: str = AUTO
     local: tuple[str, ...] = ()
+    """Keys of effects of this recording alone, in the model behind the others. What all have of them it has not: its
+    own value stands in the place of theirs."""
     candidates: tuple[str | Effect, ...] = ()
+    """Effects whose signatures are wanted."""
     with_local: bool = False
+    """Also those of effects that are of one recording."""
     about: Mapping[str, float] | None = None
+    """Coefficients of the estimator (SI), by name, about which the rows are linear; None is the recording's own fit."""
     imu: ImuSpecification | None = None
+    """With the noise that the recording shows, where it is known."""
     start: Start | None = None
+    """Where an earlier fit of the recording ended: gives the attitude."""
     noise: tuple[NoiseTerm, ...] | None = None
+    """Noise with a memory, where it is known; None learns it."""
     stretches: bool = False
+    """Signatures of an error of each sensor in each dwell and turn, in place of candidates."""
     function: SharedFunction | None = None
+    """Signatures of functions of the attitude in place of candidates, in noise that is learned beside them."""
     rivals: bool = False
+    """Also what the recording says in each noise that it may have."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a recording says.
-
-    Attributes
-    ----------
-    reduction : Reduction
-        Coefficients and candidates of this recording alone have its name behind theirs.
-    estimator, reason : str
-        And why it was taken.
-    imu : ImuSpecification
-        With the noise that the recording shows.
-    start : Start
-        Where the fit ended.
-    temperature_degc : float
-        Mean; NaN where it is not recorded.
-    data : mapping
-        As in a result.
-    names : tuple of str, length p
-        Coefficients as reported.
-    values, sigma : ndarray, shape (p,)
-        Of the recording's own fit (SI), in the frame of the report; empty for a fit about given coefficients.
-    heading_rad : float
-        Sigma of the heading at the end of the recording's own fit (rad); 0 where none is estimated.
-    noise : tuple of NoiseTerm
-        Noise with a memory that was learned.
-    widened : bool
-        The recording alone contradicts priors of the IMU file.
-    places : Places or None
-        Of its dwells and turns, where they were asked for.
-    rivals : tuple of InOneNoise
-        What it says in each noise that it may have, where it was asked for; empty for a run by hand, which learns its
-        scatter instead.
-    """
+    """What a recording says."""
 
     name: str
     serial: str
     power_on: str
     reduction: Reduction
+    """Coefficients and candidates of this recording alone have its name behind theirs."""
     estimator: str
     reason: str
+    """`estimator`, `reason`: And why it was taken."""
     imu: ImuSpecification
+    """With the noise that the recording shows."""
     start: Start
+    """Where the fit ended."""
     start_ns: int
     times: Timetable
     temperature_degc: float
+    """Mean; NaN where it is not recorded."""
     data: Mapping[str, float]
+    """As in a result."""
     statistics: FitStatistics
     names: tuple[str, ...]
+    """Coefficients as reported, length p."""
     values: Floats
     sigma: Floats
+    """`values`, `sigma`: Shape (p,). Of the recording's own fit (SI), in the frame of the report; empty for a fit about
+    given coefficients."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = field(default=())
     heading_rad: float = 0.0
+    """Sigma of the heading at the end of the recording's own fit (rad); 0 where none is estimated."""
     noise: tuple[NoiseTerm, ...] = ()
+    """Noise with a memory that was learned."""
     widened: bool = False
+    """The recording alone contradicts priors of the IMU file."""
     places: Places | None = None
+    """Of its dwells and turns, where they were asked for."""
     site: Site | None = None
     rivals: tuple[InOneNoise, ...] = ()
+    """What it says in each noise that it may have, where it was asked for; empty for a run by hand, which learns its
+    scatter instead."""
 
     @property
     def stands_alone(self) -> bool:

@@ -57,54 +57,37 @@ _LEAST_PAIRS = 6
 
 @dataclass(frozen=True)
 class Kind:
-    """Whether leftovers come back with one kind of place.
-
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    pairs : int
-        Pairs of dwells of different recordings that are alike.
-    correlation : float
-        Of leftovers that are alike, the largest of the sensors; NaN where the recordings say nothing of it.
-    score : float
-        The same over its sigma by chance after Fisher's transformation, the largest of the sensors and of all together.
-    sensors : tuple of str
-        Those whose own score exceeds chance.
-    """
+    """Whether leftovers come back with one kind of place."""
 
     kind: str
+    """One of `KINDS`."""
     pairs: int
+    """Pairs of dwells of different recordings that are alike."""
     correlation: float
+    """Of leftovers that are alike, the largest of the sensors; NaN where the recordings say nothing of it."""
     score: float
+    """The same over its sigma by chance after Fisher's transformation, the largest of the sensors and of all together.
+    """
     sensors: tuple[str, ...]
+    """Those whose own score exceeds chance."""
 
 
 @dataclass(frozen=True)
 class Recurrence:
-    """What leftovers come back with.
-
-    Attributes
-    ----------
-    answer : tuple of str
-        Of `KINDS`; empty where nothing comes back.
-    apart : bool
-        False where the recordings cannot tell the kinds of the answer apart.
-    limit : float
-        Score that chance reaches in one set of a hundred, all kinds and sensors counted; NaN where the recordings share
-        too few stops.
-    sensors : tuple of str
-        Those where most is left.
-    p_value : float
-        Probability that a right model leaves so much, all sensors counted.
-    """
+    """What leftovers come back with."""
 
     answer: tuple[str, ...]
+    """Of `KINDS`; empty where nothing comes back."""
     apart: bool
+    """False where the recordings cannot tell the kinds of the answer apart."""
     kinds: tuple[Kind, ...]
     limit: float
+    """Score that chance reaches in one set of a hundred, all kinds and sensors counted; NaN where the recordings share
+    too few stops."""
     sensors: tuple[str, ...]
+    """Those where most is left."""
     p_value: float
+    """Probability that a right model leaves so much, all sensors counted."""
 
     @property
     def told(self) -> tuple[str, ...]:

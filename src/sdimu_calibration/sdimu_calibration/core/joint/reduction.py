@@ -26,36 +26,24 @@ rounding of sums over 1e5 rows."""
 
 @dataclass(frozen=True)
 class Reduction:
-    """Rows ``y = A theta + white noise`` of one recording, linear about a point.
-
-    Attributes
-    ----------
-    names : tuple of str, length p
-        Coefficients of the estimator.
-    labels : tuple of str, length q
-        Parameters of effects that the model lacks.
-    A : ndarray, shape (k, p + q)
-        Change of each row (1) per SI unit of each parameter.
-    y : ndarray, shape (k,)
-        Rows with all parameters at zero (1).
-    point : ndarray, shape (p,)
-        Coefficients (SI) about which the rows are linear.
-    weight : ndarray, shape (p,)
-        Prior information of the coefficients (1/SI^2), prior mean zero; not among the rows.
-    rows : int
-        Number of measurements that were compressed.
-    unexplained : float
-        Sum of squares (1) that no parameter explains.
-    """
+    """Rows ``y = A theta + white noise`` of one recording, linear about a point."""
 
     names: tuple[str, ...]
+    """Coefficients of the estimator, length p."""
     labels: tuple[str, ...]
+    """Parameters of effects that the model lacks, length q."""
     A: Floats
+    """Change of each row (1) per SI unit of each parameter, shape (k, p + q)."""
     y: Floats
+    """Rows with all parameters at zero (1), shape (k,)."""
     point: Floats
+    """Coefficients (SI) about which the rows are linear, shape (p,)."""
     weight: Floats
+    """Shape (p,). Prior information of the coefficients (1/SI^2), prior mean zero; not among the rows."""
     rows: int
+    """Number of measurements that were compressed."""
     unexplained: float
+    """Sum of squares (1) that no parameter explains."""
 
 
 def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Reduction:

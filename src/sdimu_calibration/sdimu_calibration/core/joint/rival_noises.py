@@ -33,35 +33,25 @@ class InOneNoise:
     """What a recording says in one noise.
 
     The log likelihood is ``-1/2 log_det - 1/2 (squares - explained - 2 d' theta + theta' J theta)``.
-
-    Attributes
-    ----------
-    names : tuple of str, length m
-        Coefficients and candidates.
-    columns : ndarray of int, shape (m,)
-        Column of J and d of each name; two names may have one.
-    J : ndarray, shape (k, k)
-        Inverse squares of the units (SI).
-    d : ndarray, shape (k,)
-        With all parameters at zero.
-    explained, log_det : float
-        Share of the sum of squares that the noise takes with all parameters at zero, and log of its determinant (1);
-        up to what all noises of the recording have in common.
-    squares : float
-        Sum of squares in white noise (1).
-    rows : int
-        Number of measurements.
     """
 
     noise: NoiseModel
     names: tuple[str, ...]
+    """Coefficients and candidates, length m."""
     columns: Ints
+    """Shape (m,). Column of J and d of each name; two names may have one."""
     J: Floats
+    """Inverse squares of the units (SI), shape (k, k)."""
     d: Floats
+    """With all parameters at zero, shape (k,)."""
     explained: float
     log_det: float
+    """`explained`, `log_det`: Share of the sum of squares that the noise takes with all parameters at zero, and log of
+    its determinant (1); up to what all noises of the recording have in common."""
     squares: float
+    """Sum of squares in white noise (1)."""
     rows: int
+    """Number of measurements."""
 
     def places(self, place: Mapping[str, int]) -> tuple[Ints, Ints]:
         """Places of parameters that are wanted of it, and the columns of J and d that hold them.

@@ -34,18 +34,12 @@ alone, which each recording knows well."""
 
 @dataclass(frozen=True)
 class SetNoise(NoiseModel):
-    """Noise of a set: that of each recording.
-
-    Attributes
-    ----------
-    chosen : tuple of int
-        Place of each among the noises of its recording.
-    own : tuple of NoiseModel
-        Of each recording, in the order of the reports.
-    """
+    """Noise of a set: that of each recording."""
 
     chosen: tuple[int, ...] = ()
+    """Place of each among the noises of its recording."""
     own: tuple[NoiseModel, ...] = ()
+    """Of each recording, in the order of the reports."""
 
     @property
     def sizes(self) -> Mapping[Hashable, float]:

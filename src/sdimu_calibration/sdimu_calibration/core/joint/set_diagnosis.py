@@ -47,47 +47,34 @@ _TELLS = 3.0
 
 @dataclass(frozen=True)
 class SetDiagnosis:
-    """What was found in a set.
-
-    Attributes
-    ----------
-    before, after : Calibration
-        With the model as given, and with what was found.
-    threshold : float
-        Score that noise reaches in a scan.
-    standing : Standing
-        What the set knows of the unit: what a plan for the next recording begins with.
-    first : Search
-        Of the first round, with every candidate beside the model as given.
-    recurrence : Recurrence or None
-        What comes back of that what the model leaves in the stops; None where it leaves nothing.
-    refused : tuple of SetFinding
-        Effects that were found and taken back: recordings held out fit worse with them, or an unknown function of the
-        attitude explains them.
-    probabilities : Probabilities or None
-        Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
-        function of the attitude explains what is left, which the search did not know.
-    error_without : float or None
-        Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
-        them. By itself that model learns in each recording what it lacks as noise, and its own error hides it.
-    unknown : tuple of UnknownFunction
-        The function of the attitude that explains what is left, at all stops; empty without one.
-    """
+    """What was found in a set."""
 
     verdict: Verdict
     sentence: str
     findings: tuple[SetFinding, ...]
     before: Calibration
     after: Calibration
+    """`before`, `after`: With the model as given, and with what was found."""
     threshold: float
+    """Score that noise reaches in a scan."""
     advice: tuple[Advice, ...]
     standing: Standing
+    """What the set knows of the unit: what a plan for the next recording begins with."""
     first: Search[SetEvidence]
+    """Of the first round, with every candidate beside the model as given."""
     recurrence: Recurrence | None
+    """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     refused: tuple[SetFinding, ...] = ()
+    """Effects that were found and taken back: recordings held out fit worse with them, or an unknown function of the
+    attitude explains them."""
     error_without: float | None = None
+    """Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
+    them. By itself that model learns in each recording what it lacks as noise, and its own error hides it."""
     probabilities: Probabilities | None = None
+    """Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
+    function of the attitude explains what is left, which the search did not know."""
     unknown: tuple[UnknownFunction, ...] = ()
+    """The function of the attitude that explains what is left, at all stops; empty without one."""
 
 
 def diagnose_set(

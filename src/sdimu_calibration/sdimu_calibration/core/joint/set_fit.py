@@ -52,47 +52,33 @@ than a sigma."""
 
 @dataclass(frozen=True)
 class SetFit:
-    """A joint fit.
-
-    Attributes
-    ----------
-    members : tuple of Member
-        Those that could be used, in the order of `reports`.
-    local : mapping of str to tuple of str
-        By recording, the keys of effects of this recording alone.
-    varying : mapping of str to tuple of str
-        Effects that differ from power-on to power-on, with their coefficients.
-    reports : tuple of Report
-        By start and samples, whatever the order in which they were named and their names: so are all digits.
-    names : tuple of str, length P
-        Coefficients of the estimator, then those of single recordings.
-    weight : ndarray, shape (P,)
-        Prior information of the coefficients (1/SI^2), of those that contradict their prior in the wider one.
-    turn_on : tuple of TurnOn
-        Empty with one power-on.
-    left_out : tuple of (str, str)
-        Recordings that could not be used, and why.
-    asked : tuple of str
-        Names of the recordings in the order of the user.
-    function : SharedFunction or None
-        Unknown function of the attitude beside which the estimate stands.
-    unit_doubt : str
-        Which recording may be of another unit; empty where the data tell that none is.
-    """
+    """A joint fit."""
 
     members: tuple[Member, ...]
+    """Those that could be used, in the order of `reports`."""
     model: Model
     local: Mapping[str, tuple[str, ...]]
+    """By recording, the keys of effects of this recording alone."""
     varying: Mapping[str, tuple[str, ...]]
+    """Effects that differ from power-on to power-on, with their coefficients."""
     reports: tuple[Report, ...]
+    """By start and samples, whatever the order in which they were named and their names: so are all digits."""
     names: tuple[str, ...]
+    """Coefficients of the estimator, then those of single recordings, length P."""
     estimate: JointEstimate
     weight: Floats
+    """Prior information of the coefficients (1/SI^2), of those that contradict their prior in the wider one,
+    shape (P,)."""
     turn_on: tuple[TurnOn, ...]
+    """Empty with one power-on."""
     left_out: tuple[tuple[str, str], ...] = ()
+    """Recordings that could not be used, and why."""
     asked: tuple[str, ...] = ()
+    """Names of the recordings in the order of the user."""
     function: SharedFunction | None = None
+    """Unknown function of the attitude beside which the estimate stands."""
     unit_doubt: str = ""
+    """Which recording may be of another unit; empty where the data tell that none is."""
 
     @cached_property
     def power_ons(self) -> tuple[str, ...]:
@@ -148,20 +134,14 @@ def power_on(report: Report) -> str:
 
 @dataclass(frozen=True)
 class SetOptions:
-    """How a set is to be fitted.
-
-    Attributes
-    ----------
-    local : mapping of str to tuple of str
-        By recording, keys of effects in it alone.
-    scopes : mapping of str to str
-        ``unit`` or ``power-on`` for effects whose scope is not that of their trait.
-    """
+    """How a set is to be fitted."""
 
     model: Model
     estimator: str = AUTO
     local: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """By recording, keys of effects in it alone."""
     scopes: Mapping[str, str] = field(default_factory=dict)
+    """``unit`` or ``power-on`` for effects whose scope is not that of their trait."""
 
 
 def fit_set(

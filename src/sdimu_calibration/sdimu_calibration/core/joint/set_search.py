@@ -48,20 +48,14 @@ length."""
 
 @dataclass(frozen=True)
 class LocalFind:
-    """An effect of one recording.
-
-    Attributes
-    ----------
-    z : float
-        Score beside what was found before it.
-    probability : float
-        That it or something of its class is there (1).
-    """
+    """An effect of one recording."""
 
     recording: str
     key: str
     z: float
+    """Score beside what was found before it."""
     probability: float
+    """That it or something of its class is there (1)."""
 
     @property
     def label(self) -> str:
@@ -71,44 +65,30 @@ class LocalFind:
 
 @dataclass(frozen=True)
 class SetSearch:
-    """What was found in a set.
-
-    Attributes
-    ----------
-    before, after : SetFit
-        With the model as given, and with what was found.
-    chosen : tuple of Candidate
-        Effects in all recordings, the largest share of the misfit first.
-    z : tuple of float
-        Score of each beside those before it.
-    alike : mapping
-        By label, what the set cannot tell from it.
-    probability : mapping
-        By label, that it or one of these is in all recordings (1).
-    may_be : mapping
-        By label, coefficients of its class with the probability of each; of what is of one recording, too.
-    threshold : float
-        Score that noise reaches in a scan of the joint evidence.
-    first : Search
-        Of the first round: its scan.
-    standing : Standing
-        What the set knows of the unit.
-    posterior : Posterior
-        The models that all recordings together leave probable.
-    """
+    """What was found in a set."""
 
     before: SetFit
     after: SetFit
+    """`before`, `after`: With the model as given, and with what was found."""
     chosen: tuple[Candidate, ...]
+    """Effects in all recordings, the largest share of the misfit first."""
     z: tuple[float, ...]
+    """Score of each beside those before it."""
     alike: dict[str, tuple[str, ...]]
+    """By label, what the set cannot tell from it."""
     probability: dict[str, float]
+    """By label, that it or one of these is in all recordings (1)."""
     may_be: dict[str, tuple[Share, ...]]
+    """By label, coefficients of its class with the probability of each; of what is of one recording, too."""
     local: tuple[LocalFind, ...]
     threshold: float
+    """Score that noise reaches in a scan of the joint evidence."""
     first: Search[SetEvidence]
+    """Of the first round: its scan."""
     standing: Standing
+    """What the set knows of the unit."""
     posterior: Posterior[SetEvidence]
+    """The models that all recordings together leave probable."""
 
 
 def search_set(

@@ -39,39 +39,28 @@ LISTED = 4
 
 @dataclass(frozen=True)
 class SetFinding:
-    """An effect that was found.
-
-    Attributes
-    ----------
-    recording : str
-        The only one that shows it; empty where all do.
-    value, sigma : float
-        SI, of the joint fit with everything that was found.
-    z : float
-        Score beside what was found before it.
-    alike : tuple of str
-        What the set cannot tell from it.
-    probability : float
-        That it or one of these is in all recordings, or in this one.
-    may_be : tuple of Share
-        Coefficients of that class with the probability of each, the likeliest first.
-    against : str
-        The other one of two recordings, where a coefficient is not the same in both: no data tell which of them
-        changed. Empty for all else.
-    """
+    """An effect that was found."""
 
     label: str
     title: str
     recording: str
+    """The only one that shows it; empty where all do."""
     value: float
     sigma: float
+    """`value`, `sigma`: SI, of the joint fit with everything that was found."""
     z: float
+    """Score beside what was found before it."""
     unit: str
     display_unit: str
     alike: tuple[str, ...]
+    """What the set cannot tell from it."""
     probability: float = float("nan")
+    """That it or one of these is in all recordings, or in this one."""
     may_be: tuple[Share, ...] = ()
+    """Coefficients of that class with the probability of each, the likeliest first."""
     against: str = ""
+    """The other one of two recordings, where a coefficient is not the same in both: no data tell which of them changed.
+    Empty for all else."""
 
     @property
     def tag(self) -> str:
@@ -81,26 +70,18 @@ class SetFinding:
 
 @dataclass(frozen=True)
 class SetFacts:
-    """What the verdict on a set follows from.
-
-    Attributes
-    ----------
-    after : Calibration
-        With what was found.
-    fit : SetFit
-        The same, as it was estimated.
-    again : Recurrence or None
-        What comes back of that what the model leaves in the stops; None where it leaves nothing.
-    told : Probabilities or None
-        None where the search did not know of all that explains the set: a function of the attitude, or what was taken
-        back.
-    """
+    """What the verdict on a set follows from."""
 
     findings: Sequence[SetFinding]
     after: Calibration
+    """With what was found."""
     fit: SetFit
+    """The same, as it was estimated."""
     again: Recurrence | None
+    """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     told: Probabilities | None
+    """None where the search did not know of all that explains the set: a function of the attitude, or what was taken
+    back."""
 
     @property
     def beside_function(self) -> bool:

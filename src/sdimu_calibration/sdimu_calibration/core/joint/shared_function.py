@@ -24,19 +24,13 @@ from sdimu_calibration.core.joint.reduction import Reduction, reduced
 
 @dataclass(frozen=True)
 class SharedFunction:
-    """Functions of the attitude that a set has in common.
-
-    Attributes
-    ----------
-    sensors : tuple of str
-        Those that have them, in the order of `CHANNELS`.
-    size : mapping of str to float
-        One-sigma of the weights of a sensor (rad/s, m/s^2); empty where nobody knows it yet.
-    """
+    """Functions of the attitude that a set has in common."""
 
     functions: AttitudeFunctions
     sensors: tuple[str, ...]
+    """Those that have them, in the order of `CHANNELS`."""
     size: Mapping[str, float]
+    """One-sigma of the weights of a sensor (rad/s, m/s^2); empty where nobody knows it yet."""
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -33,25 +33,17 @@ _READINGS = 9
 
 @dataclass(frozen=True)
 class Places:
-    """Where the IMU was in each dwell of a recording, n of them.
-
-    Attributes
-    ----------
-    start, end : ndarray, shape (n,)
-        Seconds after the start of the recording (s).
-    up : ndarray, shape (n, 3)
-        Direction of the mean specific force in b: a unit vector.
-    temperature_degc : ndarray, shape (n,)
-        Mean; NaN where none is recorded.
-    way : ndarray, shape (k, 3)
-        Directions of the specific force in b in dwells and turns (1).
-    """
+    """Where the IMU was in each dwell of a recording, n of them."""
 
     start: Floats
     end: Floats
+    """`start`, `end`: Seconds after the start of the recording (s), shape (n,)."""
     up: Floats
+    """Shape (n, 3). Direction of the mean specific force in b: a unit vector."""
     temperature_degc: Floats
+    """Shape (n,). Mean; NaN where none is recorded."""
     way: Floats
+    """Directions of the specific force in b in dwells and turns (1), shape (k, 3)."""
 
     def __len__(self) -> int:
         """Return the number of dwells."""

@@ -32,28 +32,21 @@ _RANK = 1e-6
 
 @dataclass(frozen=True)
 class Variation:
-    """Coefficients of K recordings beside their joint estimate.
-
-    Attributes
-    ----------
-    names : tuple of str, length p
-    recordings : tuple of str, length K
-    z : ndarray, shape (K, p)
-        Deviation of the recording over its sigma; NaN where the recording says nothing of the coefficient.
-    deviation : ndarray, shape (K, p)
-        The same (SI): what the recording would add to the joint value.
-    p_value : ndarray, shape (p,)
-        Probability that coefficients that are constant scatter so far.
-    trends : tuple of SetTrend
-        The likeliest covariate of each coefficient, the least probable first.
-    """
+    """Coefficients of K recordings beside their joint estimate."""
 
     names: tuple[str, ...]
+    """Length p."""
     recordings: tuple[str, ...]
+    """Length K."""
     z: Floats
+    """Shape (K, p). Deviation of the recording over its sigma; NaN where the recording says nothing of the coefficient.
+    """
     deviation: Floats
+    """Shape (K, p). The same (SI): what the recording would add to the joint value."""
     p_value: Floats
+    """Probability that coefficients that are constant scatter so far, shape (p,)."""
     trends: tuple[SetTrend, ...]
+    """The likeliest covariate of each coefficient, the least probable first."""
 
 
 @dataclass(frozen=True)

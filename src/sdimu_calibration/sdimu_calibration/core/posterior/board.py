@@ -31,29 +31,20 @@ worth its digits."""
 
 @dataclass(frozen=True)
 class InNoise:
-    """Information on p coefficients and u candidates in a noise of r modes, and what they say of the modes.
-
-    Attributes
-    ----------
-    J : ndarray, shape (p + u, p + u)
-    d : ndarray, shape (p + u,)
-        Without the pull of the white residuals that the modes take.
-    R : ndarray, shape (6 n, r)
-        Mean errors in all stretches of each mode.
-    X : ndarray, shape (r, p + u)
-        Modes that one unit of each parameter takes the place of.
-    u : ndarray, shape (r,)
-        Modes with all parameters at zero.
-    inverse : ndarray, shape (r, r)
-        Their covariance with the parameters known.
-    """
+    """Information on p coefficients and u candidates in a noise of r modes, and what they say of the modes."""
 
     J: Floats
+    """Shape (p + u, p + u)."""
     d: Floats
+    """Without the pull of the white residuals that the modes take, shape (p + u,)."""
     R: Floats
+    """Mean errors in all stretches of each mode, shape (6 n, r)."""
     X: Floats
+    """Modes that one unit of each parameter takes the place of, shape (r, p + u)."""
     u: Floats
+    """Modes with all parameters at zero, shape (r,)."""
     inverse: Floats
+    """Their covariance with the parameters known, shape (r, r)."""
 
 
 class Board(Generic[E]):

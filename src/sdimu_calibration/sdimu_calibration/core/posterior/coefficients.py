@@ -37,34 +37,24 @@ says so, nothing speaks against it."""
 
 @dataclass(frozen=True)
 class Moments:
-    """Deviation of the q coefficients from the calibration about which all is linear.
-
-    Attributes
-    ----------
-    mean : ndarray, shape (q,)
-        SI.
-    covariance : ndarray, shape (q, q)
-    """
+    """Deviation of the q coefficients from the calibration about which all is linear."""
 
     mean: Floats
+    """SI, shape (q,)."""
     covariance: Floats
+    """Shape (q, q)."""
 
 
 @dataclass(frozen=True)
 class _Mean:
-    """What a noise adds to the biases in the mean over the dwells.
-
-    Attributes
-    ----------
-    moved : ndarray, shape (6, p + u)
-        What it takes off per unit of each parameter (SI).
-    mean : ndarray, shape (6,)
-    covariance : ndarray, shape (6, 6)
-    """
+    """What a noise adds to the biases in the mean over the dwells."""
 
     moved: Floats
+    """What it takes off per unit of each parameter (SI), shape (6, p + u)."""
     mean: Floats
+    """Shape (6,)."""
     covariance: Floats
+    """Shape (6, 6)."""
 
 
 class Averages:

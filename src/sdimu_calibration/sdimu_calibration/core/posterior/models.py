@@ -36,16 +36,12 @@ _WIDTHS = np.column_stack([_PRECISION, _LOG_SHARE])
 
 @dataclass(frozen=True)
 class Data:
-    """Information on q candidates in one noise, the coefficients taken out, in units of the prior sizes.
-
-    Attributes
-    ----------
-    J : ndarray, shape (q, q)
-    d : ndarray, shape (q,)
-    """
+    """Information on q candidates in one noise, the coefficients taken out, in units of the prior sizes."""
 
     J: Floats
+    """Shape (q, q)."""
     d: Floats
+    """Shape (q,)."""
     prior: Prior
 
     def at(self, members: Members) -> Expansion:

@@ -86,18 +86,12 @@ SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise of a model.
-
-    Attributes
-    ----------
-    terms : tuple of NoiseTerm
-        With their sizes.
-    log_prior : float
-        Log of its odds beside white noise, of the share of its sizes too (1).
-    """
+    """Noise of a model."""
 
     terms: tuple[NoiseTerm, ...] = ()
+    """With their sizes."""
     log_prior: float = 0.0
+    """Log of its odds beside white noise, of the share of its sizes too (1)."""
 
     @property
     def sizes(self) -> Mapping[Hashable, float]:

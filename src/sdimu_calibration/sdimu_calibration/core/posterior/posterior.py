@@ -58,20 +58,14 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Posterior(Generic[E]):
-    """The models that the data leave probable.
-
-    Attributes
-    ----------
-    models : tuple of Weighed
-        The likeliest first.
-    noises : tuple of (NoiseModel, float)
-        Every noise that is probable, each with its probability, the likeliest first: those of the models, and those in
-        which no effects were looked for because they differ little from one of these.
-    """
+    """The models that the data leave probable."""
 
     board: Board[E]
     models: tuple[Weighed, ...]
+    """The likeliest first."""
     noises: tuple[tuple[NoiseModel, float], ...]
+    """Every noise that is probable, each with its probability, the likeliest first: those of the models, and those in
+    which no effects were looked for because they differ little from one of these."""
 
     @property
     def best(self) -> Weighed:

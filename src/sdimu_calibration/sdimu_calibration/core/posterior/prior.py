@@ -51,36 +51,24 @@ for."""
 
 @dataclass(frozen=True)
 class Prior:
-    """Prior of q candidates.
-
-    Attributes
-    ----------
-    log_share : ndarray, shape (q,)
-        Log of the share u of each (1); variants of a parameter share its odds.
-    cause : ndarray of int, shape (q,)
-        Candidates of one effect with the same time constant or the like share a number.
-    parameter : ndarray of int, shape (q,)
-        Variants of one parameter share a number: a model has one of them.
-    repeats : ndarray of bool, shape (q,)
-        What happens at one time may happen at several.
-    positive : ndarray of bool, shape (q,)
-        The size cannot be negative.
-    own : ndarray of bool, shape (q,)
-        An equation that no physics names.
-    drift : ndarray of int, shape (q,)
-        Sensor axis whose bias a candidate lets drift, in all recordings or in one; -1 of all others.
-    twin : ndarray of int, shape (q,)
-        Candidates that no data of this plan tell apart share a number: a model has one of them.
-    """
+    """Prior of q candidates."""
 
     log_share: Floats
+    """Shape (q,). Log of the share u of each (1); variants of a parameter share its odds."""
     cause: Ints
+    """Candidates of one effect with the same time constant or the like share a number, shape (q,)."""
     parameter: Ints
+    """Shape (q,). Variants of one parameter share a number: a model has one of them."""
     repeats: Bools
+    """What happens at one time may happen at several, shape (q,)."""
     positive: Bools
+    """The size cannot be negative, shape (q,)."""
     own: Bools
+    """An equation that no physics names, shape (q,)."""
     drift: Ints
+    """Shape (q,). Sensor axis whose bias a candidate lets drift, in all recordings or in one; -1 of all others."""
     twin: Ints
+    """Shape (q,). Candidates that no data of this plan tell apart share a number: a model has one of them."""
 
     def of(self, places: Ints) -> Prior:
         """Prior of some of the candidates, as unlikely as they are among all of them.

@@ -32,68 +32,47 @@ class Share:
 
 @dataclass(frozen=True)
 class MemberShare:
-    """A member of a family.
-
-    Attributes
-    ----------
-    probability : float
-        Of the models that hold it.
-    value, sigma : float
-        Its size over these models (SI).
-    """
+    """A member of a family."""
 
     label: str
     probability: float
+    """Of the models that hold it."""
     value: float
     sigma: float
+    """`value`, `sigma`: Its size over these models (SI)."""
     unit: str
     display_unit: str
 
 
 @dataclass(frozen=True)
 class FamilyShare:
-    """A family of effects on a sensor.
-
-    Attributes
-    ----------
-    sensor : str
-        As of `family_of`.
-    probability : float
-        Of the models that hold a member of it.
-    members : tuple of MemberShare
-        The likeliest first; those of less than `LEAST` are left out.
-    """
+    """A family of effects on a sensor."""
 
     family: str
     sensor: str
+    """As of `family_of`."""
     probability: float
+    """Of the models that hold a member of it."""
     members: tuple[MemberShare, ...]
+    """The likeliest first; those of less than `LEAST` are left out."""
 
 
 @dataclass(frozen=True)
 class NoiseShare:
-    """A kind of noise with a memory.
-
-    Attributes
-    ----------
-    probability : float
-        Of the models that hold it.
-    size : float
-        Geometric mean over these models (SI, `unit`).
-    low, high : float
-        Ends of the interval of 95 % where the noise is told; NaN elsewhere.
-    axes : tuple of int
-        Sensors of the triad that have it: all but of an unknown function, which may be of some.
-    """
+    """A kind of noise with a memory."""
 
     triad: str
     kind: str
     probability: float
+    """Of the models that hold it."""
     size: float
+    """Geometric mean over these models (SI, `unit`)."""
     low: float
     high: float
+    """`low`, `high`: Ends of the interval of 95 % where the noise is told; NaN elsewhere."""
     unit: str
     axes: tuple[int, ...] = AXES
+    """Sensors of the triad that have it: all but of an unknown function, which may be of some."""
 
     @property
     def where(self) -> str:
@@ -103,15 +82,10 @@ class NoiseShare:
 
 @dataclass(frozen=True)
 class Probabilities:
-    """What the data say of all that may be missing in a model, the likeliest first.
-
-    Attributes
-    ----------
-    nothing : float
-        Probability that no effect is missing.
-    """
+    """What the data say of all that may be missing in a model, the likeliest first."""
 
     nothing: float
+    """Probability that no effect is missing."""
     families: tuple[FamilyShare, ...]
     noise: tuple[NoiseShare, ...]
 

@@ -18,29 +18,23 @@ from sdimu_calibration.core.posterior.posterior import Posterior
 
 @dataclass(frozen=True)
 class UnknownFunction:
-    """Error of sensors of a triad as a function of what it follows, in n stretches.
-
-    Attributes
-    ----------
-    follows : str
-        One of `FOLLOWS`.
-    variable : ndarray, shape (n, k)
-        What it follows: mean direction of the specific force in b (1), body rate (rad/s), or temperature (K).
-    turning : ndarray of bool, shape (n,)
-    axes : tuple of int
-        Sensors that have it; of the others mean and sigma are zero.
-    mean, sigma : ndarray, shape (n, 3)
-        Error of each axis and its sigma (SI); without its mean over the dwells, which is a bias, and of one of the
-        attitude without what is linear in the force, which is in scale factors, misalignments and mass unbalances.
-    """
+    """Error of sensors of a triad as a function of what it follows, in n stretches."""
 
     triad: str
     follows: str
+    """One of `FOLLOWS`."""
     variable: Floats
+    """Shape (n, k). What it follows: mean direction of the specific force in b (1), body rate (rad/s), or temperature
+    (K)."""
     turning: Bools
+    """Shape (n,)."""
     mean: Floats
     sigma: Floats
+    """`mean`, `sigma`: Shape (n, 3). Error of each axis and its sigma (SI); without its mean over the dwells, which is
+    a bias, and of one of the attitude without what is linear in the force, which is in scale factors, misalignments and
+    mass unbalances."""
     axes: tuple[int, ...] = AXES
+    """Sensors that have it; of the others mean and sigma are zero."""
 
 
 def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[UnknownFunction, ...]:
