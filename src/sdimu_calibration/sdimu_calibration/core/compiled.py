@@ -17,9 +17,14 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar, cast
 
-import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.runtime import rtsys
+from sdimu_calibration.core.lean import lean
+
+with lean():
+    import numba
+    from llvmlite import binding
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.runtime import rtsys
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -56,6 +61,45 @@ class _Checked(IndexDataCacheFile):  # type: ignore[misc]
             file.write(content.getvalue() + _mark(content.getvalue()))
 
 
+class _Loaded(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of one function; its form for the compiler is read where another function takes it in.
+
+    Numba reads it with every function from its cache: half of the time of loading, for nothing where all is compiled.
+    """
+
+    _bitcode = b""
+    _shared_module: Any
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        name, kind, data = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        machine_code, library._bitcode = data
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None and self._bitcode:
+            self._shared_module = binding.parse_bitcode(self._bitcode)
+            self._codegen._engine._load_defined_symbols(self._shared_module)
+        return super()._get_module_for_linking()
+
+
+class _Results(CompileResultCacheImpl):  # type: ignore[misc]
+    """What numba keeps of a compiled function, with `_Loaded` as its machine code."""
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        codegen, described = target_context.codegen(), payload[1]
+        codegen._library_class = _Loaded
+        # What numba asks for by name; it looks names up in the form for the compiler otherwise.
+        codegen._engine._defined_symbols |= {described.llvm_func_name, described.llvm_cpython_wrapper_name}
+        return super().rebuild(target_context, payload)
+
+
 class _Cache(FunctionCache):  # type: ignore[misc]
     """Numba's cache of one function, whose machine code is used without getting the compiler ready for it.
 
@@ -65,6 +109,8 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     Processes that start together (nodes, workers) want the same functions: one compiles a function, the others wait
     for it. A function waits only for those that it calls, so no two processes wait for each other.
     """
+
+    _impl_class = _Results
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)

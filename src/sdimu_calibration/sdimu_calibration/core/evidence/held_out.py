@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.lean import lean
+
+with lean():
+    from scipy.linalg import solve_triangular
 
 _LEAST_LEFT = 1e-6
 """Share (1) of a row that its own fit must leave for the prediction without it to be worked out of that fit: below, a
