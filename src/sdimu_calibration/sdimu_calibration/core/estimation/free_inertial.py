@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.stretch_doubt import doubt_in_stretch
 from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
@@ -137,7 +138,8 @@ class Navigator(Protocol):
     def wander(self) -> Wander:
         """How wandering biases of the sensors would show in the recording."""
 
-    def evidence(self) -> NavigationEvidence:
+    @property
+    def bare(self) -> LinearEvidence:
         """Whitened innovations about this fit and the signatures of its coefficients."""
 
     def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
@@ -215,7 +217,7 @@ def _in_learned_noise(again: Refit, fit: Navigator, segment: Segment) -> Refit:
     if fit.noise is None:
         return again
     at = (segment.begin_s - segment.levelled_s, segment.begin_s + segment.length_s)
-    evidence = fit.evidence().in_inner(fit.wander.inner)
+    evidence = cast(NavigationEvidence, fit.bare).in_inner(fit.wander.inner)
     rows = (evidence.epoch >= segment.seen[0]) & (evidence.epoch < segment.seen[1])
     return replace(
         again, covariance=again.covariance + doubt_in_stretch(evidence, rows, fit.wander, fit.noise.terms, at)

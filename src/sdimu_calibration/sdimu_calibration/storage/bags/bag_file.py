@@ -10,8 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.shell_words import joined
 from sdimu_calibration.storage.bags.bag_metadata import named_files, read_metadata
@@ -219,10 +217,10 @@ def _read_mcap(
         for block in walk.blocks():
             for channel in walk.channels.keys() - targets.keys():
                 targets[channel] = target_of(walk.channels[channel].topic, walk.type_name(channel))
-            for channel in np.unique(block.channel):
-                target = targets[int(channel)]
+            for channel in block.channels():
+                target = targets[channel]
                 if target is not None:
-                    _take(block, int(channel), unpack, target)
+                    _take(block, channel, unpack, target)
     except DamagedError as error:
         if bag not in {part.parent, part}:
             raise DataError(f"{bag}: a file in it is cut short or damaged ({error})") from error

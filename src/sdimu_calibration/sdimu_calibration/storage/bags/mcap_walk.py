@@ -62,6 +62,11 @@ class Messages:
         for channel, time_ns, start, length in zip(*columns, strict=True):
             yield channel, time_ns, self.content[start : start + length]
 
+    def channels(self) -> list[int]:
+        """Channels that have a message, ascending."""
+        # Numbers of two bytes: counting them is ten times as fast as sorting.
+        return np.flatnonzero(np.bincount(self.channel)).tolist()
+
 
 @compiled
 def _number(content: NDArray[np.uint8], start: int, size: int) -> int:
@@ -257,7 +262,7 @@ class McapWalk:
             self._register(content[start[k] : start[k] + length[k]])
         chosen = kind == _MESSAGE
         found = Messages(content, channel[chosen], time_ns[chosen], start[chosen], length[chosen])
-        if not np.isin(found.channel, list(self.channels)).all():
+        if not self.channels.keys() >= set(found.channels()):
             raise DamagedError("a message is of a channel that nothing describes")
         if (found.time_ns < 0).any():
             raise DamagedError("a message was logged after the year 2262")
