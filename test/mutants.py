@@ -41,7 +41,9 @@ class Mutant(NamedTuple):
 
 
 MUTANTS = (
-    Mutant("filter/kalman.py", "P[:k, :k] = FP @ F.T + Q\n", "P[:k, :k] = FP @ F.T - Q\n", (f"{TESTS}/filter",)),
+    Mutant(
+        "filter/kalman.py", "P[i, j] = FPF[i, j] + Q[i, j]\n", "P[i, j] = FPF[i, j] - Q[i, j]\n", (f"{TESTS}/filter",)
+    ),
     Mutant(
         "evidence/held_out.py",
         "        A = self.J - W.T @ W + np.diag(self.weight)\n",

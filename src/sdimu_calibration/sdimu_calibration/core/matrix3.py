@@ -1,7 +1,8 @@
 """Small matrices in compiled loops: those of 3x3 as nine numbers, row by row, because that allocates nothing.
 
-A call of BLAS for a 3x3 product costs more than the product. Elements have any unit; those of rotations are
-dimensionless.
+A call of BLAS for a 3x3 product costs more than the product. Arrays are put into parts of others by loops: by indices,
+numba also compiles the words of its error for shapes that differ, for seconds. Elements have any unit; those of
+rotations are dimensionless.
 """
 
 from __future__ import annotations
@@ -104,6 +105,47 @@ def orthonormal3(m: Matrix3) -> Matrix3:
         1.5 * m[7] - 0.5 * b[7],
         1.5 * m[8] - 0.5 * b[8],
     )
+
+
+@compiled
+def put(block: Floats, out: Floats, row: int, column: int) -> None:
+    """Write a block to a part of a matrix.
+
+    Parameters
+    ----------
+    block : ndarray, shape (m, n)
+        Any units.
+    out : ndarray, shape (row + m or more, column + n or more)
+        Filled in place from its element (row, column) on.
+    row, column : int
+        First of each.
+    """
+    for i in range(block.shape[0]):
+        for j in range(block.shape[1]):
+            out[row + i, column + j] = block[i, j]
+
+
+@compiled
+def corner(A: Floats, row: int, column: int) -> Floats:
+    """Copy the part of a matrix from an element on.
+
+    Parameters
+    ----------
+    A : ndarray, shape (m, n)
+        Any units.
+    row, column : int
+        First of each.
+
+    Returns
+    -------
+    ndarray, shape (m - row, n - column)
+        Contiguous.
+    """
+    out = np.empty((A.shape[0] - row, A.shape[1] - column))
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = A[row + i, column + j]
+    return out
 
 
 @compiled

@@ -223,7 +223,8 @@ def _sum_before(x: Floats, mean: Floats, at: Ints, reached: int, total: Floats, 
     """
     for i in range(len(x)):
         while reached < len(at) and at[reached] == i:
-            out[reached] = total
+            for k in range(3):
+                out[reached, k] = total[k]
             reached += 1
         for k in range(3):
             total[k] += x[i, k] - mean[k]

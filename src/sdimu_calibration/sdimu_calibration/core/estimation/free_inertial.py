@@ -28,6 +28,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import NavigationEviden
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
 from sdimu_calibration.core.filter.passes import Pass, one_pass, pass_input, pass_settings
+from sdimu_calibration.core.matrix3 import put
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_vector
@@ -358,7 +359,9 @@ def _navigate(
             navigate_cycle(C_nb, velocity, position, turned, dv, steps.dt[c], gravity)
             velocity[2], position[2] = 0.0, height
             c += 1
-        place[e], speed[e], attitude[e] = position, velocity, C_nb
+        for i in range(3):
+            place[e, i], speed[e, i] = position[i], velocity[i]
+        put(C_nb, attitude[e], 0, 0)
     return place, speed, attitude
 
 

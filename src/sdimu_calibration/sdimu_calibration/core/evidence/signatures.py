@@ -25,6 +25,7 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import MEASURED, NAV, PassOutput
 from sdimu_calibration.core.filter.kalman import whiten
+from sdimu_calibration.core.matrix3 import corner, put
 from sdimu_calibration.core.navigation.ins_errors import add_columns, responses
 
 
@@ -53,7 +54,7 @@ def _responses(
         return
     own = np.empty((6, NAV))
     for c in range(n):
-        own[:, :] = R[c]
+        put(R[c], own, 0, 0)
         for s in range(6):
             for i in range(NAV):
                 R[c, s, i] = 0.0
@@ -131,6 +132,23 @@ class _Filter(NamedTuple):
 
 
 @compiled
+def _measure(known: _Filter, e: int, low: int, D: Floats, seconds: float, V: Floats, W: Floats, row: int) -> None:
+    """Write what an epoch e measures, from channel `low` on, to W from `row` on, and take it out of V (9, q).
+
+    `D` (6, q) are the integrals of the sensors over the `seconds` of the epoch.
+    """
+    S = corner(known.H[e, :, :NAV], low, 0) @ V
+    for i in range(6):
+        for j in range(S.shape[1]):
+            S[6 - low + i, j] += D[i, j] / seconds
+    put(whiten(corner(known.L[e], low, low), S), W, row, 0)
+    taken = corner(known.K[e, :NAV], 0, low) @ S
+    for i in range(NAV):
+        for j in range(S.shape[1]):
+            V[i, j] -= taken[i, j]
+
+
+@compiled
 def _signatures(
     cycles: _Cycles, epochs: Epochs, regressors: Regressors, w_ie: Floats, weight: Floats, known: _Filter, W: Floats
 ) -> None:
@@ -152,15 +170,15 @@ def _signatures(
             _add_weighed_columns(values[a:b], channel, parameter, R, direct, G, D)
         else:
             add_columns(values[a:b], channel, parameter, R, dt[a:b], G, D)
-        V = known.Phi[e] @ V + G
+        V = known.Phi[e] @ V
+        for i in range(NAV):
+            for j in range(q):
+                V[i, j] += G[i, j]
         if kind[e] == 0:
             continue
         low = 0 if abs(kind[e]) == 2 else 6
         m = MEASURED - low
-        S = np.ascontiguousarray(known.H[e, low:, :NAV]) @ V
-        S[6 - low :] += D / dt[a:b].sum()
-        W[row : row + m] = whiten(np.ascontiguousarray(known.L[e, low:, low:]), S)
-        V -= np.ascontiguousarray(known.K[e, :NAV, low:]) @ S
+        _measure(known, e, low, D, dt[a:b].sum(), V, W, row)
         row += m
 
 
@@ -263,10 +281,7 @@ def _constant_signatures(
                     _add_own_integral(share * dt[c], 6 * k, D)
         if m == 0:
             continue
-        S = np.ascontiguousarray(known.H[e, low:, :NAV]) @ V
-        S[6 - low :] += D / dt[a:b].sum()
-        W[row : row + m] = whiten(np.ascontiguousarray(known.L[e, low:, low:]), S)
-        V -= np.ascontiguousarray(known.K[e, :NAV, low:]) @ S
+        _measure(known, e, low, D, dt[a:b].sum(), V, W, row)
         row += m
 
 

@@ -34,9 +34,9 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.filter.kalman import predict, propagate, update, whiten
 from sdimu_calibration.core.filter.shaken import at_the_end
-from sdimu_calibration.core.matrix3 import applied, elements, sparse_product, transposed
+from sdimu_calibration.core.matrix3 import applied, corner, elements, put, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
     add_columns,
@@ -313,27 +313,31 @@ def _measurement(
     cos = np.cos(min(abs(settings.reference[0]), earth.POLE_LIMIT))
     z[1] = (state.position[1] - settings.reference[1]) * (r_e + height) * cos
     z[2] = height - state.position[2]
-    z[3:6] = state.velocity
     w_b, g_b = applied(C_bn, w_ie[0], w_ie[1], w_ie[2]), applied(C_bn, g_n[0], g_n[1], g_n[2])
     for i in range(3):
         H[i, i] = 1.0
         H[3 + i, 3 + i] = 1.0
+        z[3 + i] = state.velocity[i]
         z[6 + i] = sums[i] / T - w_b[i]
         z[9 + i] = sums[3 + i] / T + g_b[i]
         R[i, i] = settings.position_sigma**2
         R[3 + i, 3 + i] = settings.velocity_sigma**2
         R[6 + i, 6 + i] = gyro_psd / T + settings.extra_gyro
         R[9 + i, 9 + i] = accel_psd / T + settings.extra_accel
-    H[6:9, 6:9] = sparse_product(C.T, skew(w_ie))
-    H[9:12, 6:9] = sparse_product(C.T, skew(-g_n))
-    H[6:12, NAV : NAV + p] = D / T
+    put(sparse_product(C.T, skew(w_ie)), H, 6, 6)
+    put(sparse_product(C.T, skew(-g_n)), H, 9, 6)
+    for i in range(6):
+        for j in range(p):
+            H[6 + i, NAV + j] = D[i, j] / T
     if settings.shared_noise:
         fC = sparse_product(skew(-g_n), C)
-        M[6:9, 6:9] = -gyro_psd * C
-        M[3:6, 6:9] = -gyro_psd * T / 2.0 * fC
-        M[0:3, 6:9] = -gyro_psd * T**2 / 6.0 * fC
-        M[3:6, 9:12] = accel_psd * C
-        M[0:3, 9:12] = accel_psd * T / 2.0 * C
+        for i in range(3):
+            for j in range(3):
+                M[6 + i, 6 + j] = -gyro_psd * C[i, j]
+                M[3 + i, 6 + j] = -gyro_psd * T / 2.0 * fC[i, j]
+                M[i, 6 + j] = -gyro_psd * T**2 / 6.0 * fC[i, j]
+                M[3 + i, 9 + j] = accel_psd * C[i, j]
+                M[i, 9 + j] = accel_psd * T / 2.0 * C[i, j]
     return z, H, R, M
 
 
@@ -350,25 +354,27 @@ def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
     state.position[0] -= x[0] / (r_n + settings.reference[2])
     state.position[1] -= x[1] / ((r_e + settings.reference[2]) * cos)
     state.position[2] += x[2]
-    state.velocity[:] -= x[3:6]
-    x[:6] = 0.0
+    for i in range(3):
+        state.velocity[i] -= x[3 + i]
+        x[i] = x[3 + i] = 0.0
     if not settings.closed_loop:
         return
     e = x[6:9].copy()
-    state.C_nb[:, :] = orthonormal(sparse_product(rotation_matrix(e), state.C_nb))
+    put(orthonormal(sparse_product(rotation_matrix(e), state.C_nb)), state.C_nb, 0, 0)
     if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 > 1e-14:
         J = np.eye(3) + 0.5 * skew(e)
-        P[6:9, :] = sparse_product(J, P[6:9, :])
-        P[:, 6:9] = sparse_product(P[:, 6:9], J.T)
-    state.used[:] += x[NAV : NAV + p]
+        put(sparse_product(J, P[6:9, :]), P, 6, 0)
+        put(sparse_product(P[:, 6:9], J.T), P, 0, 6)
+    for j in range(p):
+        state.used[j] += x[NAV + j]
     x[6 : NAV + p] = 0.0
 
 
 @compiled
 def _restart(settings: PassSettings, state: PassState) -> None:
     """Begin the navigation anew from the known point, at rest, in place; attitude and coefficients stay."""
-    state.position[:] = settings.reference
-    state.velocity[:] = 0.0
+    for i in range(3):
+        state.position[i], state.velocity[i] = settings.reference[i], 0.0
     state.x[:6] = 0.0
     state.P[:6, :] = 0.0
     state.P[:, :6] = 0.0
@@ -393,9 +399,8 @@ def _fade(settings: PassSettings, T: float, used: Floats, decay: Floats, drive: 
 @compiled
 def _write(out: PassOutput, e: int, low: int, innovation: Floats, white: Floats, L: Floats) -> None:
     """Write the innovations of an epoch, from row `low` on, their sigmas, likelihood and squares, in place."""
-    out.innovation[e, low:] = innovation
-    out.normalised[e, low:] = white
     for i in range(MEASURED - low):
+        out.innovation[e, low + i], out.normalised[e, low + i] = innovation[i], white[i]
         variance = 0.0
         for j in range(i + 1):
             variance += L[i, j] ** 2
@@ -440,37 +445,33 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
         propagate(state.x, state.P, Phi, G, Q, decay, drive)
         kind = data.kind[e]
         if keep:
-            out.Phi[e] = Phi
+            put(Phi, out.Phi[e], 0, 0)
             if data.restart[e]:
                 out.Phi[e, :, :6] = 0.0
-            out.G[e] = G[:, :g]
+            put(G[:, :g], out.G[e], 0, 0)
         if kind != SKIP:
             low = 0 if abs(kind) == ALL else 6
             if settings.shaken:
                 at_the_end(settings.reference[0], f_n, data.dt[data.first[e] : data.last[e]], C_mean, state.C_nb, sums)
             z, H, R, M = _measurement(settings, state, D, sums, T, p, data.white[e])
-            Hl = np.ascontiguousarray(H[low:])
-            Ml = np.ascontiguousarray(M[:, low:])
-            Rl = np.ascontiguousarray(R[low:, low:])
+            Hl, Ml, Rl = corner(H, low, 0), corner(M, 0, low), corner(R, low, low)
             if kind > 0:
                 innovation, L, K = update(state.x, state.P, z[low:], Hl, Rl, Ml)
                 if keep:
-                    out.K[e, :, low:] = K[:kept]
+                    put(K[:kept], out.K[e], 0, low)
             else:
-                HM = sparse_product(Hl, Ml)
-                HP = sparse_product(Hl, state.P)
-                L = cholesky(sparse_product(HP, Hl.T) + HM + HM.T + Rl)
-                innovation = z[low:] - sparse_product(Hl, state.x.reshape(-1, 1))[:, 0]
+                innovation, L = predict(state.x, state.P, z[low:], Hl, Rl, Ml)
             white = whiten(L, innovation.reshape(-1, 1))[:, 0]
             _write(out, e, low, innovation, white, L)
             if keep:
-                out.H[e, low:] = Hl[:, :kept]
-                out.L[e, low:, low:] = L
+                put(Hl[:, :kept], out.H[e], low, 0)
+                put(L, out.L[e], low, low)
             if kind > 0:
                 _feed_back(settings, state, p)
-        out.estimate[e] = state.used + state.x[NAV : NAV + p]
+        for j in range(p):
+            out.estimate[e, j] = state.used[j] + state.x[NAV + j]
         for i in range(state.x.shape[0]):
             out.sigma[e, i] = np.sqrt(state.P[i, i])
-        out.C_nb[e] = state.C_nb
+        put(state.C_nb, out.C_nb[e], 0, 0)
         if e % out.stride == 0:
-            out.covariance[e // out.stride] = state.P[NAV : NAV + p, NAV : NAV + p]
+            put(state.P[NAV : NAV + p, NAV : NAV + p], out.covariance[e // out.stride], 0, 0)

@@ -18,7 +18,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.matrix3 import sparse_product
+from sdimu_calibration.core.matrix3 import put, sparse_product
 
 
 @compiled
@@ -41,19 +41,26 @@ def propagate(x: Floats, P: Floats, Phi: Floats, G: Floats, Q: Floats, decay: Fl
     k = Phi.shape[0]
     n = x.shape[0]
     F = np.empty((k, n))
-    F[:, :k] = Phi
-    F[:, k:] = G
+    put(Phi, F, 0, 0)
+    put(G, F, 0, k)
     FP = F @ P
-    x[:k] = F @ x
-    P[:k, :k] = FP @ F.T + Q
-    P[:k, k:] = FP[:, k:]
+    FPF, Fx = FP @ F.T, F @ x
+    for i in range(k):
+        x[i] = Fx[i]
+        for j in range(k):
+            P[i, j] = FPF[i, j] + Q[i, j]
+        for j in range(k, n):
+            P[i, j] = FP[i, j]
     for i in range(k, n):
         d = decay[i - k]
         if d != 1.0:
             x[i] *= d
-            P[:k, i] *= d
-            P[i, k:] *= d
-            P[k:, i] *= d
+            for j in range(k):
+                P[j, i] *= d
+            for j in range(k, n):
+                P[i, j] *= d
+            for j in range(k, n):
+                P[j, i] *= d
         P[i, i] += drive[i - k]
     for i in range(k):
         for j in range(k, n):
@@ -142,7 +149,10 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
     m, n = H.shape
     B = sparse_product(H, P)
     HM = sparse_product(H, M)
-    S = R + HM + HM.T
+    S = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            S[i, j] = R[i, j] + HM[i, j] + HM[j, i]
     for i in range(m):
         for k in range(n):
             h = H[i, k]
@@ -168,9 +178,47 @@ def update(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> 
     for i in range(m):
         for k in range(n):
             x[k] += Kt[i, k] * innovation[i]
-    F = B - 0.5 * sparse_product(S, Kt)
+    F = sparse_product(S, Kt)
+    for i in range(m):
+        for k in range(n):
+            F[i, k] = B[i, k] - 0.5 * F[i, k]
     KF = Kt.T @ F
     for i in range(n):
         for j in range(n):
             P[i, j] -= KF[i, j] + KF[j, i]
-    return innovation, L, np.ascontiguousarray(Kt.T)
+    K = np.empty((n, m))
+    for i in range(n):
+        for j in range(m):
+            K[i, j] = Kt[j, i]
+    return innovation, L, K
+
+
+@compiled
+def predict(x: Floats, P: Floats, z: Floats, H: Floats, R: Floats, M: Floats) -> tuple[Floats, Floats]:
+    """Compare a measurement with its prediction, and do not take it.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+    P : ndarray, shape (n, n)
+    z : ndarray, shape (m,)
+    H : ndarray, shape (m, n)
+    R : ndarray, shape (m, m)
+    M : ndarray, shape (n, m)
+        All as of `update`.
+
+    Returns
+    -------
+    innovation : ndarray, shape (m,)
+    L : ndarray, shape (m, m)
+        Lower Cholesky factor of the innovation's covariance.
+    """
+    HM = sparse_product(H, M)
+    S = sparse_product(sparse_product(H, P), H.T)
+    Hx = sparse_product(H, x.reshape(-1, 1))
+    innovation = z.copy()
+    for i in range(len(z)):
+        innovation[i] -= Hx[i, 0]
+        for j in range(len(z)):
+            S[i, j] = S[i, j] + HM[i, j] + HM[j, i] + R[i, j]
+    return innovation, cholesky(S)

@@ -70,8 +70,10 @@ def navigation_error_matrix(position: Floats, velocity: Floats, f_n: Floats) -> 
     F[5, 3] += c_e
     F[5, 4] -= c_n
     dc = np.zeros((3, 6))  # change of the Coriolis rate 2 w_ie + w_en with position and velocity error
-    dc[:, :3] = 2.0 * d_ie + d_en_p
-    dc[:, 3:] = d_en_v
+    for i in range(3):
+        for j in range(3):
+            dc[i, j] = 2.0 * d_ie[i, j] + d_en_p[i, j]
+            dc[i, 3 + j] = d_en_v[i, j]
     for j in range(6):
         F[3, j] -= dc[1, j] * v_d - dc[2, j] * v_e
         F[4, j] -= dc[2, j] * v_n - dc[0, j] * v_d
@@ -82,8 +84,10 @@ def navigation_error_matrix(position: Floats, velocity: Floats, f_n: Floats) -> 
     F[6, 7], F[6, 8] = w_d + t_d, -t_e
     F[7, 6], F[7, 8] = -(w_d + t_d), w_n + t_n
     F[8, 6], F[8, 7] = t_e, -(w_n + t_n)
-    F[6:9, 0:3] += d_ie + d_en_p
-    F[6:9, 3:6] += d_en_v
+    for i in range(3):
+        for j in range(3):
+            F[6 + i, j] += d_ie[i, j] + d_en_p[i, j]
+            F[6 + i, 3 + j] += d_en_v[i, j]
     return F
 
 
@@ -101,9 +105,16 @@ def transition(F: Floats, dt: float) -> Floats:
     -------
     ndarray, shape (9, 9)
     """
-    A = F * dt
+    A = np.empty((9, 9))
+    for i in range(9):
+        for j in range(9):
+            A[i, j] = F[i, j] * dt
     A2 = sparse_product(A, A)
-    return np.eye(9) + A + 0.5 * A2 + sparse_product(A, A2) / 6.0
+    out = sparse_product(A, A2)
+    for i in range(9):
+        for j in range(9):
+            out[i, j] = (1.0 if i == j else 0.0) + A[i, j] + 0.5 * A2[i, j] + out[i, j] / 6.0
+    return out
 
 
 @compiled
@@ -132,15 +143,15 @@ def process_noise(C_qg: Floats, C_qa: Floats, f_n: Floats, dt: float) -> Floats:
     Xg = sparse_product(X, C_qg)
     XgX = sparse_product(Xg, X.T)
     Q = np.zeros((9, 9))
-    Q[6:9, 6:9] = C_qg * dt
-    Q[3:6, 6:9] = Xg * (dt**2 / 2.0)
-    Q[3:6, 3:6] = C_qa * dt + XgX * (dt**3 / 3.0)
-    Q[0:3, 6:9] = Xg * (dt**3 / 6.0)
-    Q[0:3, 3:6] = C_qa * (dt**2 / 2.0) + XgX * (dt**4 / 8.0)
-    Q[0:3, 0:3] = C_qa * (dt**3 / 3.0) + XgX * (dt**5 / 20.0)
-    Q[6:9, 3:6] = Q[3:6, 6:9].T
-    Q[6:9, 0:3] = Q[0:3, 6:9].T
-    Q[3:6, 0:3] = Q[0:3, 3:6].T
+    for i in range(3):
+        for j in range(3):
+            Q[6 + i, 6 + j] = C_qg[i, j] * dt
+            Q[3 + i, 6 + j] = Xg[i, j] * (dt**2 / 2.0)
+            Q[3 + i, 3 + j] = C_qa[i, j] * dt + XgX[i, j] * (dt**3 / 3.0)
+            Q[i, 6 + j] = Xg[i, j] * (dt**3 / 6.0)
+            Q[i, 3 + j] = C_qa[i, j] * (dt**2 / 2.0) + XgX[i, j] * (dt**4 / 8.0)
+            Q[i, j] = C_qa[i, j] * (dt**3 / 3.0) + XgX[i, j] * (dt**5 / 20.0)
+            Q[6 + j, 3 + i], Q[6 + j, i], Q[3 + j, i] = Q[3 + i, 6 + j], Q[i, 6 + j], Q[i, 3 + j]
     return Q
 
 

@@ -151,7 +151,8 @@ def _reduce(t: Floats, omega: Floats, force: Floats, nominal: float, carry: Floa
             # What `velocity_increment` adds for a force that is constant in the body.
             x0, x1, x2 = carry[_ALPHA], carry[_ALPHA + 1], carry[_ALPHA + 2]
             _add_twice_crossed(carry, -1.0 / 6.0, x0, x1, x2, carry[_UPS], carry[_UPS + 1], carry[_UPS + 2])
-            out[count] = carry[:_COLUMNS]
+            for column in range(_COLUMNS):
+                out[count, column] = carry[column]
             count += 1
             carry[:_COLUMNS] = 0.0
     return count
