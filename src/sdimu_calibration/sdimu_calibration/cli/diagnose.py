@@ -84,6 +84,8 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     notes = test.recording.notes
     with explained(console, notes), bar(console) as progress:
         fit = solve(test, wanted, chosen, progress=progress)
+        # The page shows it of this fit; known before fits in other noise are made of it, it holds for these, too.
+        fit.held_out_rms()
         found = climb(fit, extra, progress, refits=request.grow)
         progress("navigation without aid", 0.97)
         more = report_extras(found, fit)

@@ -58,7 +58,7 @@ _FAST = 3.0
 2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
 _NOISY = 4.0
 """NIS per degree of freedom (1) from which the rests are looked at: noise of twice the stated size is possible."""
-_OF_THE_PASSES = ("bend", "known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest")
+_OF_THE_PASSES = ("bend", "known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest", "_held_out")
 """Cached properties that neither noise nor doubt changes."""
 NO_FIELD = (
     "the site states no magnetic field: that of mid-northern latitudes is assumed; state magnetic_field_nt (north, "
@@ -266,8 +266,7 @@ class NavigationFit(Fit):
 
     def _of_the_passes(self) -> dict[str, Any]:
         """Collect what is known of the passes by now, for a fit by the same ones."""
-        known = vars(self)
-        return {name: known[name] for name in _OF_THE_PASSES if name in known}
+        return {name: vars(self)[name] for name in _OF_THE_PASSES if name in vars(self)}
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
@@ -297,12 +296,8 @@ class NavigationFit(Fit):
         """
         output = self.last.output
         dof = 3 * int(np.isfinite(output.nis).sum())
-        white = FitStatistics(
-            float(output.log_likelihood.sum()),
-            float(np.nansum(output.nis) / max(dof, 1)),
-            float(dof),
-            float(self.passes),
-        )
+        nis = float(np.nansum(output.nis) / max(dof, 1))
+        white = FitStatistics(float(output.log_likelihood.sum()), nis, float(dof), float(self.passes))
         if self.noise is None:
             return white
         return replace(
@@ -318,6 +313,10 @@ class NavigationFit(Fit):
         The first stop stays in every fit (it gives the attitude); the others are left out in turn, in
         `HELD_OUT_FOLDS` interleaved groups. None when there are fewer than two stops.
         """
+        return self._held_out
+
+    @cached_property
+    def _held_out(self) -> float | None:
         stops = np.unique(self.prepared.phases.stop[self.prepared.kind > 0])
         folds = [np.isin(self.prepared.phases.stop, stops[1:][fold::HELD_OUT_FOLDS]) for fold in range(HELD_OUT_FOLDS)]
         left_out = [fold & (self.prepared.kind > 0) for fold in folds]
@@ -352,8 +351,8 @@ class NavigationFit(Fit):
         del evidence
         imu, shaken = self.setup.imu, self.prepared.shaking
         if shaken is not None:
-            scatter = float(np.hypot(imu.gyro_white_noise, shaken * np.sqrt(self.setup.epoch_s)))
-            imu = replace(imu, gyro_white_noise=scatter)
+            scatter = np.hypot(imu.gyro_white_noise, shaken * np.sqrt(self.setup.epoch_s))
+            imu = replace(imu, gyro_white_noise=float(scatter))
         return check(self.last.output, self.prepared, imu)
 
     @cached_property
