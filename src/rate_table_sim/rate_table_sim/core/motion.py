@@ -25,7 +25,7 @@ class TableMotion:
     """Seconds from the start, shape (n,)."""
     angle: Floats
     rate: Floats
-    """`angle`, `rate`: Shape (n, 3). Axis angles (rad, not wrapped) and rates (rad/s): outer, middle, inner; about x,
+    """`angle`, `rate`: shape (n, 3). Axis angles (rad, not wrapped) and rates (rad/s): outer, middle, inner; about x,
     y, z when free."""
     encoder_angle: Floats
     """Angles as the encoders read them (rad), shape (n, 3)."""

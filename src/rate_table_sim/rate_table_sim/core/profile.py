@@ -21,7 +21,7 @@ class Trapezoid:
 
     samples: int
     ramp_samples: int
-    """`samples`, `ramp_samples`: Length of the turn and of each ramp, in sample intervals."""
+    """`samples`, `ramp_samples`: length of the turn and of each ramp, in sample intervals."""
     step_s: float
     """Sample interval."""
     angle_rad: float

@@ -19,7 +19,7 @@ class Imperfections:
     """The inner axis leans towards the middle axis (turned about middle x inner)."""
     base_tilt_north_rad: float = 0.0
     base_tilt_east_rad: float = 0.0
-    """`base_tilt_north_rad`, `base_tilt_east_rad`: The base is turned about North and about East: the two components of
+    """`base_tilt_north_rad`, `base_tilt_east_rad`: the base is turned about North and about East: the two components of
     one rotation vector."""
     wobble_rad: float = 0.0
     """Half angle of the cone on which the inner axis travels, once a turn of the inner axis, against the sense of the

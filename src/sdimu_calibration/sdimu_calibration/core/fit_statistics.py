@@ -13,12 +13,12 @@ class FitStatistics:
     """In the noise that was learned, where any was."""
     nis_mean: float
     nis_dof: float
-    """`nis_mean`, `nis_dof`: Mean of the squared normalised innovations in white noise (1), and their number."""
+    """`nis_mean`, `nis_dof`: mean of the squared normalised innovations in white noise (1), and their number."""
     passes: float
     """Number of passes or steps."""
     nis_in_noise: float | None = None
     held_out_in_noise: float | None = None
-    """`nis_in_noise`, `held_out_in_noise`: Mean of the squared residuals (1), and RMS of the normalised prediction
+    """`nis_in_noise`, `held_out_in_noise`: mean of the squared residuals (1), and RMS of the normalised prediction
     errors at stops left out one by one (1), in noise with a memory; None where none was learned."""
     held_out_rms: float | None = None
     """RMS of the normalised prediction errors where the fit has not seen the data (1); None where nobody asked, or

@@ -44,29 +44,20 @@ FEWEST = 100
 
 @dataclass(frozen=True)
 class OpeningOptions:
-    """What the user says of a test.
-
-    Attributes
-    ----------
-    assumed_site : str
-        Name of the default site where the user states none; empty for a stated site.
-    stated : Stated
-        Units and signs; what is left out is recognised.
-    handheld : bool or None
-        Whether the IMU is moved by hand; None decides by its turns and by the noise of the gyros in the rests.
-    measured_noise : bool
-        Replace the white noise of the specification by that of the rests.
-    classes : tuple of ImuSpecification
-        Where the user states no IMU: what to choose from, as for `imu_class.propose`; `imu` holds until then.
-    """
+    """What the user says of a test."""
 
     imu: ImuSpecification
     site: Site
     assumed_site: str = ""
+    """Name of the default site where the user states none; empty for a stated site."""
     stated: Stated = field(default_factory=Stated)
+    """Units and signs; what is left out is recognised."""
     handheld: bool | None = None
+    """Whether the IMU is moved by hand; None decides by its turns and by the noise of the gyros in the rests."""
     measured_noise: bool = False
+    """Replace the white noise of the specification by that of the rests."""
     classes: tuple[ImuSpecification, ...] = ()
+    """Where the user states no IMU: what to choose from, as for `imu_class.propose`; `imu` holds until then."""
 
 
 class OpenedTest(NamedTuple):

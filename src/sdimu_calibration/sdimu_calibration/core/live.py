@@ -60,19 +60,19 @@ class EpochEstimate:
     """The same in seconds after the origin of the recording."""
     dwell: bool
     used: bool
-    """`dwell`, `used`: At rest; a measurement was taken."""
+    """`dwell`, `used`: at rest; a measurement was taken."""
     stop: int
     body_frame: str
     names: tuple[str, ...]
     units: tuple[str, ...]
     display_units: tuple[str, ...]
-    """`names`, `units`, `display_units`: Length p."""
+    """`names`, `units`, `display_units`: length p."""
     coefficients: Floats
     covariance: Floats
     """`coefficients`, `covariance`: SI, in `body_frame`, shapes (p,) and (p, p)."""
     position_error_m: Floats
     velocity: Floats
-    """`position_error_m`, `velocity`: Shape (3,). N, E, D against the known point (m); N, E, D (m/s)."""
+    """`position_error_m`, `velocity`: shape (3,). N, E, D against the known point (m); N, E, D (m/s)."""
     q_nb: Floats
     """Scalar first, shape (4,)."""
     navigation_covariance: Floats

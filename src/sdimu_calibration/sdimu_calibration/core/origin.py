@@ -28,17 +28,17 @@ class Origin:
     """Mean over the recording (deg C)."""
     temperature_low_degc: float = math.nan
     temperature_high_degc: float = math.nan
-    """`temperature_low_degc`, `temperature_high_degc`: Lowest and highest in the recording (deg C)."""
+    """`temperature_low_degc`, `temperature_high_degc`: lowest and highest in the recording (deg C)."""
     rate_rad_s: float = math.nan
     """Largest mean of the body rate over a second (rad/s)."""
     recording: str = ""
     """Name of the bag."""
     imu: str = ""
     site: str = ""
-    """`imu`, `site`: Names of their files."""
+    """`imu`, `site`: names of their files."""
     imu_file: str = ""
     site_file: str = ""
-    """`imu_file`, `site_file`: Paths of these files where the user named a path; empty for a name in config/."""
+    """`imu_file`, `site_file`: paths of these files where the user named a path; empty for a name in config/."""
 
     def stated(self, serial: str | None, power_on: str | None) -> Origin:
         """Return it with what the user states; None leaves what the bag says."""

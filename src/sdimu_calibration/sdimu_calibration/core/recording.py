@@ -49,7 +49,7 @@ class DataFault:
     """Samples, or seconds of status, concerned."""
     start_s: float = float("nan")
     end_s: float = float("nan")
-    """`start_s`, `end_s`: First and last time (s); NaN where that has no meaning."""
+    """`start_s`, `end_s`: first and last time (s); NaN where that has no meaning."""
     grave: bool = False
     """The estimate is not to be trusted until someone has looked at it."""
 

@@ -37,14 +37,14 @@ class History:
     """End of the epoch (s), shape (m,)."""
     value: Floats
     sigma: Floats
-    """`value`, `sigma`: Coefficients (SI), shape (m, p)."""
+    """`value`, `sigma`: coefficients (SI), shape (m, p)."""
     attitude_sigma: Floats
     """N, E, D (rad), shape (m, 3)."""
     stop: Ints
     """Shape (m,)."""
     dwell: Bools
     used: Bools
-    """`dwell`, `used`: Shape (m,)."""
+    """`dwell`, `used`: shape (m,)."""
     nis: Floats
     """Shape (m, 4). Squared normalised innovation of position, velocity, rate, force (3 degrees of freedom each); NaN
     unmeasured."""
@@ -64,20 +64,20 @@ class Rest:
 
     start_s: float
     end_s: float
-    """`start_s`, `end_s`: Seconds."""
+    """`start_s`, `end_s`: seconds."""
     rate: tuple[float, float, float]
     force: tuple[float, float, float]
-    """`rate`, `force`: Residuals of the means, in the axes of the IMU (rad/s, m/s^2)."""
+    """`rate`, `force`: residuals of the means, in the axes of the IMU (rad/s, m/s^2)."""
     turn: tuple[float, float, float]
     """Residual of the turn to this rest, N, E, D (rad; the heading of north is arbitrary); NaN where nobody saw it."""
     rate_sigma: float
     force_sigma: float
     turn_sigma: float
-    """`rate_sigma`, `force_sigma`, `turn_sigma`: What they scatter by an axis: white noise, and what was learned beyond
+    """`rate_sigma`, `force_sigma`, `turn_sigma`: what they scatter by an axis: white noise, and what was learned beyond
     it (rad/s, m/s^2, rad)."""
     ahead: tuple[float, float, float] = NO_AXES
     ahead_sigma: tuple[float, float, float] = NO_AXES
-    """`ahead`, `ahead_sigma`: Error of the force predicted from everything but itself, and what it scatters by (m/s^2);
+    """`ahead`, `ahead_sigma`: error of the force predicted from everything but itself, and what it scatters by (m/s^2);
     NaN in results of before."""
 
 
@@ -89,7 +89,7 @@ class TurnOn:
     sigma: float
     low: float
     high: float
-    """`sigma`, `low`, `high`: Standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not
+    """`sigma`, `low`, `high`: standard deviation and bounds of its 95 % interval (SI); `low` is 0 where the data do not
     show any scatter."""
     power_ons: int
     """Number of power-ons that were seen."""
@@ -110,10 +110,10 @@ class SetRecording:
     duration_s: float
     samples: float
     nis: float
-    """`duration_s`, `samples`, `nis`: Length (s), number of samples, mean normalised innovation squared (1)."""
+    """`duration_s`, `samples`, `nis`: length (s), number of samples, mean normalised innovation squared (1)."""
     values: Floats
     sigma: Floats
-    """`values`, `sigma`: Shape (p,). Of its own fit (SI), in the order of the coefficients of the set; NaN where it has
+    """`values`, `sigma`: shape (p,). Of its own fit (SI), in the order of the coefficients of the set; NaN where it has
     none."""
     deviate: Floats
     """Shape (p,). Its deviation from the joint estimate over the sigma of that (1); NaN where it says nothing."""

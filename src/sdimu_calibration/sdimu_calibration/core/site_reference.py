@@ -19,10 +19,10 @@ class Reference:
     """As an effect."""
     told: float
     sigma: float
-    """`told`, `sigma`: As the site tells it (rad, m/s^2); a sigma of zero takes it at its word."""
+    """`told`, `sigma`: as the site tells it (rad, m/s^2); a sigma of zero takes it at its word."""
     value: float
     value_sigma: float
-    """`value`, `value_sigma`: With what the data say of it."""
+    """`value`, `value_sigma`: with what the data say of it."""
     unit: str = ""
     display_unit: str = ""
     origin: str = "stated"

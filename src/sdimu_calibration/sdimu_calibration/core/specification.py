@@ -22,7 +22,7 @@ class Site:
 
     latitude_rad: float
     height_m: float = 0.0
-    """`latitude_rad`, `height_m`: Geodetic latitude and ellipsoidal height."""
+    """`latitude_rad`, `height_m`: geodetic latitude and ellipsoidal height."""
     gravity_m_s2: float | None = None
     """Measured gravity; None takes WGS-84 normal gravity."""
     initial_azimuth_rad: float | None = None
@@ -34,7 +34,7 @@ class Site:
     """North, East, Down (T), for the effects of magnetism; None takes that of mid-northern latitudes."""
     latitude_sigma_rad: float = 0.0
     gravity_sigma_m_s2: float = 0.0
-    """`latitude_sigma_rad`, `gravity_sigma_m_s2`: Standard deviation of latitude and gravity as they are told; zero
+    """`latitude_sigma_rad`, `gravity_sigma_m_s2`: standard deviation of latitude and gravity as they are told; zero
     takes them at their word."""
 
 
@@ -132,7 +132,7 @@ class StatedPrior:
     name: str
     mean: float
     sigma: float
-    """`mean`, `sigma`: In the frame of the report (SI); a sigma of zero fixes the coefficient at the mean."""
+    """`mean`, `sigma`: in the frame of the report (SI); a sigma of zero fixes the coefficient at the mean."""
     unit: str
     """In which both were written: tells a wrong one; empty where none was, which only a pure number may have."""
 
@@ -145,7 +145,7 @@ class Model:
     """Names of registered sensor effects, in the order of the state."""
     velocity_sigma: float = 2e-5
     position_sigma: float = 1e-3
-    """`velocity_sigma`, `position_sigma`: One-sigma of "the table stands still, at the known point" per epoch (m/s, m).
+    """`velocity_sigma`, `position_sigma`: one-sigma of "the table stands still, at the known point" per epoch (m/s, m).
     """
     settle_s: float = 1.0
     """Time after the end of motion in which no measurement is taken (s)."""
@@ -158,7 +158,7 @@ class Model:
     """Model that the same samples drive the navigation and make Zw and Zf."""
     extra_rate_sigma: float = 0.0
     extra_force_sigma: float = 0.0
-    """`extra_rate_sigma`, `extra_force_sigma`: Noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s,
+    """`extra_rate_sigma`, `extra_force_sigma`: noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s,
     m/s^2)."""
     priors: tuple[StatedPrior, ...] = ()
     """Of single coefficients, in the place of what the IMU's file says of all of an effect."""

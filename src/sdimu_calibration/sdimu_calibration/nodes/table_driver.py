@@ -65,7 +65,7 @@ class Arrival:
     start_ns: int
     arrived_ns: int
     end_ns: int
-    """`start_ns`, `arrived_ns`, `end_ns`: Stamps of the joint states: before the move, at rest on the target, at the
+    """`start_ns`, `arrived_ns`, `end_ns`: stamps of the joint states: before the move, at rest on the target, at the
     end of the dwell."""
     angles: tuple[float, ...]
     """Of the joints at the end (rad)."""

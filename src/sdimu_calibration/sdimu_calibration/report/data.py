@@ -48,7 +48,7 @@ class Residuals:
     """Shape (e, 12). Predicted one sigma (SI); NaN where not measured."""
     before: Floats
     after: Floats
-    """`before`, `after`: Shape (e, 12). In sigmas, with the model as given and with what was found added; NaN where not
+    """`before`, `after`: shape (e, 12). In sigmas, with the model as given and with what was found added; NaN where not
     measured."""
 
 
@@ -147,12 +147,12 @@ class Scored:
     unit: str
     z: float
     left: float
-    """`z`, `left`: Score with the model as given, and with what was found added."""
+    """`z`, `left`: score with the model as given, and with what was found added."""
     estimate: float
     sigma: float
     smallest: float
     prior: float
-    """`smallest`, `prior`: Minimal detectable size, and the size that physics gives it (inf where unknown)."""
+    """`smallest`, `prior`: minimal detectable size, and the size that physics gives it (inf where unknown)."""
     retention: float
     """Share of its signature that the model leaves."""
     chosen: bool
@@ -209,7 +209,7 @@ class FreeInputs:
 
     start: Floats
     end: Floats
-    """`start`, `end`: Seconds, shape (s,)."""
+    """`start`, `end`: seconds, shape (s,)."""
     turn: Bools
     """Shape (s,)."""
     before: Floats

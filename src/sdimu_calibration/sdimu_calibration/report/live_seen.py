@@ -19,7 +19,7 @@ class Progress:
     phase: str = "starting"
     table_s: float = 0.0
     filter_s: float = 0.0
-    """`table_s`, `filter_s`: Data time that table and filter have reached (s after the first status)."""
+    """`table_s`, `filter_s`: data time that table and filter have reached (s after the first status)."""
     sigmas: dict[str, float] = field(default_factory=dict)
     """Sigma (SI) by coefficient, as last published."""
     first: dict[str, float] = field(default_factory=dict)

@@ -58,7 +58,7 @@ class SeenDiagnosis:
     """Size of the score that noise reaches, in words."""
     ranking: Rows = ()
     ladder: Rows = ()
-    """`ranking`, `ladder`: Candidates and their scores; models and their errors."""
+    """`ranking`, `ladder`: candidates and their scores; models and their errors."""
     channels: tuple[str, ...] = ()
     """Length c."""
     stops: tuple[str, ...] = ()

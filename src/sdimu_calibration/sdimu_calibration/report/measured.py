@@ -25,7 +25,7 @@ class Overlay:
     """Middle of each stop (s), shape (s,)."""
     measured: Floats
     predicted: Floats
-    """`measured`, `predicted`: Shape (s, 12). NaN where not measured. Rate and specific force: what the sensors say,
+    """`measured`, `predicted`: shape (s, 12). NaN where not measured. Rate and specific force: what the sensors say,
     and what the model with everything found says that they should, means over the stop. Position and velocity: what
     navigation with the model as given says after the turn, where rest is the truth, and what the found effects make of
     it."""
@@ -74,7 +74,7 @@ class Jumps:
     """At which it ends, shape (m,)."""
     before: Floats
     after: Floats
-    """`before`, `after`: Velocity innovation N, E, D in sigmas, with the model as given and with what was found,
+    """`before`, `after`: velocity innovation N, E, D in sigmas, with the model as given and with what was found,
     shape (m, 3)."""
 
 

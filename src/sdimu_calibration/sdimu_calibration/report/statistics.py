@@ -35,7 +35,7 @@ class Whiteness:
     """Shape (4, b). Probability density; zero where a kind is not measured."""
     expected: tuple[Floats, ...]
     found: tuple[Floats, ...]
-    """`expected`, `found`: Quantiles of the normal distribution and of each kind (sigma), each shape (q,)."""
+    """`expected`, `found`: quantiles of the normal distribution and of each kind (sigma), each shape (q,)."""
     lags: Ints
     """Epochs, shape (l,)."""
     correlation: Floats
@@ -50,7 +50,7 @@ class Whiteness:
     """Shape (s, 4). Mean NIS per degree of freedom at each stop; NaN where not measured."""
     low: Floats
     high: Floats
-    """`low`, `high`: Band of `nis` with `LEVEL`, shape (s, 4)."""
+    """`low`, `high`: band of `nis` with `LEVEL`, shape (s, 4)."""
 
 
 def whiteness(fit: NavigationFit) -> Whiteness:

@@ -27,7 +27,7 @@ class Row:
     unit: str
     value: float
     sigma: float
-    """`value`, `sigma`: Both zero when the body frame makes the coefficient zero by definition."""
+    """`value`, `sigma`: both zero when the body frame makes the coefficient zero by definition."""
     truth: float | None = None
     error: float | None = None
     error_sigmas: float | None = None

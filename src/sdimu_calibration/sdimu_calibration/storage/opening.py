@@ -143,7 +143,7 @@ class Opening:
     source: Source = field(default_factory=Source)
     handheld: bool | None = None
     measured_noise: bool = False
-    """`site`, `imu`, `source`, `handheld`, `measured_noise`: As for `open_test`."""
+    """`site`, `imu`, `source`, `handheld`, `measured_noise`: as for `open_test`."""
     whole_turns: float = 0.0
     """By hand: how well turns of about 360 deg about the vertical are whole ones (rad); 0 for none."""
     rests: tuple[tuple[float, float], ...] = ()
@@ -154,7 +154,7 @@ class Opening:
     """Spans of time (s) in which no fit takes a measurement."""
     serial: str | None = None
     power_on: str | None = None
-    """`serial`, `power_on`: Of the unit, in place of what the bag says."""
+    """`serial`, `power_on`: of the unit, in place of what the bag says."""
     reference_degc: float | None = None
     """Temperature from which temperature effects count (deg C); None is that at the start of the recording."""
     imu_file: str | None = None

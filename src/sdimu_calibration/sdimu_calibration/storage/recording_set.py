@@ -39,7 +39,7 @@ class BagSource:
     bag: Path
     site: str | None = None
     imu: str | None = None
-    """`site`, `imu`: As the options of the same names."""
+    """`site`, `imu`: as the options of the same names."""
     source: Source = field(default_factory=Source)
     handheld: bool | None = None
     measured_noise: bool = False

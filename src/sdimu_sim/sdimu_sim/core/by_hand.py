@@ -43,13 +43,13 @@ class ByHand:
     """Random attitudes, uniform over all."""
     imu: ImuSpecification
     site: Site
-    """`imu`, `site`: The site makes the truth; no estimator knows it."""
+    """`imu`, `site`: the site makes the truth; no estimator knows it."""
     seed: int = 1
     """Of everything random: attitudes, times, sway, coefficients, noise."""
     rate_hz: float = 100.0
     rest_s: tuple[float, float] = (1.5, 5.0)
     turn_s: tuple[float, float] = (0.8, 2.5)
-    """`rest_s`, `turn_s`: Shortest and longest rest and turn."""
+    """`rest_s`, `turn_s`: shortest and longest rest and turn."""
     lever_arm_m: tuple[float, float, float] = (0.12, -0.05, 0.2)
     """Accelerometers from the wrist, in b: their force in a turn is not gravity's alone."""
     effects: tuple[str, ...] = ()

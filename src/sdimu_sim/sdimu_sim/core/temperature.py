@@ -22,10 +22,10 @@ class TemperatureProfile:
     """Of the chamber at t = 0 (deg C)."""
     rise: float = 0.0
     tau_s: float = 1200.0
-    """`rise`, `tau_s`: Self-heating (K) and its time constant (s)."""
+    """`rise`, `tau_s`: self-heating (K) and its time constant (s)."""
     ripple: float = 0.0
     ripple_period_s: float = 600.0
-    """`ripple`, `ripple_period_s`: Of the air conditioning (K, s)."""
+    """`ripple`, `ripple_period_s`: of the air conditioning (K, s)."""
     knots: tuple[tuple[float, float], ...] = ()
     """Times (s, ascending, from 0) and temperatures (deg C) between which the chamber goes straight; constant after the
     last. Empty: constant at `start_degc`."""
@@ -36,7 +36,7 @@ class TemperatureProfile:
     offset: float = 0.0
     noise: float = 0.0
     resolution: float = 0.0
-    """`offset`, `noise`, `resolution`: Of the thermometer: error (K), white noise of a reading (K, one sigma), step of
+    """`offset`, `noise`, `resolution`: of the thermometer: error (K), white noise of a reading (K, one sigma), step of
     its output (K; 0 for none)."""
 
     @property

@@ -52,7 +52,7 @@ class ImuTruth:
     """Rotation vector of the IMU on the platform: ``C_tb = rotation_matrix(mount)``."""
     gyro_white_noise: float = 0.0
     accel_white_noise: float = 0.0
-    """`gyro_white_noise`, `accel_white_noise`: Densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
+    """`gyro_white_noise`, `accel_white_noise`: densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     effects: tuple[str, ...] = ()
     """Hidden effects, canonical keys with sizes (`sdimu_sim.core.hidden`); those that name a coefficient or the lever
     arm are in `coefficients` and `lever_arm_m` already."""
@@ -64,10 +64,10 @@ class ImuTruth:
     """North, East, Down."""
     gyro_step_rad: float = 0.0
     accel_step_m_s: float = 0.0
-    """`gyro_step_rad`, `accel_step_m_s`: Quantum of the angle and velocity increments; 0 for none."""
+    """`gyro_step_rad`, `accel_step_m_s`: quantum of the angle and velocity increments; 0 for none."""
     gyro_limit_rad_s: float = np.inf
     accel_limit_m_s2: float = np.inf
-    """`gyro_limit_rad_s`, `accel_limit_m_s2`: Output saturates at this size."""
+    """`gyro_limit_rad_s`, `accel_limit_m_s2`: output saturates at this size."""
 
     def __post_init__(self) -> None:
         """Refuse coefficient names that nothing would read."""

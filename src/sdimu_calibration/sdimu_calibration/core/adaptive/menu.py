@@ -14,7 +14,7 @@ class Menu:
 
     angles_rad: tuple[float, ...] = tuple(math.radians(a) for a in (90.0, -90.0, 180.0, -180.0))
     oblique_rad: tuple[float, ...] = tuple(math.radians(a) for a in (45.0, -45.0))
-    """`angles_rad`, `oblique_rad`: Signed angles of turns about each axis; those of turns to stops between the axes,
+    """`angles_rad`, `oblique_rad`: signed angles of turns about each axis; those of turns to stops between the axes,
     from which the gimbals of a table can make few turns: only for what is to be told apart, and back."""
     rate_rad_s: float = math.radians(10.0)
     """Mean rate."""
@@ -23,7 +23,7 @@ class Menu:
     acceleration_rad_s2: float = math.radians(20.0)
     shortest_s: float = 10.0
     longest_s: float = 60.0
-    """`shortest_s`, `longest_s`: Stops."""
+    """`shortest_s`, `longest_s`: stops."""
 
     def turns(self, apart: bool, square: bool) -> tuple[Turn, ...]:
         """List the turns to choose from.

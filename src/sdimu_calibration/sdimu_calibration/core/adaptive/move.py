@@ -60,7 +60,7 @@ class Move:
     """What it brings (nat/min), the turn that leads there counted."""
     elapsed_s: float
     dwell_s: float
-    """`elapsed_s`, `dwell_s`: All that it takes, and its last stop (s)."""
+    """`elapsed_s`, `dwell_s`: all that it takes, and its last stop (s)."""
     worth: Worth
     done: bool
     """Nothing is lacking after it."""

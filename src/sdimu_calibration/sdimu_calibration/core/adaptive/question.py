@@ -55,7 +55,7 @@ class Decision:
     """Largest sigma over its limit (1)."""
     named: tuple[str, ...]
     alike: tuple[str, ...]
-    """`named`, `alike`: Effects that were found, and what the first open class holds besides."""
+    """`named`, `alike`: effects that were found, and what the first open class holds besides."""
 
 
 def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:

@@ -34,20 +34,14 @@ _WIDEN = 10.0
 
 @dataclass(frozen=True)
 class Alignment:
-    """Initial attitude.
-
-    Attributes
-    ----------
-    C_nb : ndarray, shape (3, 3)
-    sigma : ndarray, shape (3,)
-        Sigma of the attitude error about N, E, D (rad).
-    filter_sigma : ndarray, shape (3,)
-        Sigma with which the filter starts (rad).
-    """
+    """Initial attitude."""
 
     C_nb: Floats
+    """Shape (3, 3)."""
     sigma: Floats
+    """Sigma of the attitude error about N, E, D (rad), shape (3,)."""
     filter_sigma: Floats
+    """Sigma with which the filter starts (rad), shape (3,)."""
 
     def with_azimuth_of(self, C_nb: Floats) -> Alignment:
         """Return the alignment with the azimuth of an attitude as a convention, which no data move.

@@ -36,18 +36,12 @@ _STOPS = 20
 
 @dataclass(frozen=True)
 class StartPoint:
-    """Where passes or least squares linearise first.
-
-    Attributes
-    ----------
-    C_nb : ndarray, shape (3, 3)
-        Initial attitude, b to n.
-    coefficients : ndarray, shape (p,)
-        SI; after a coarse alignment the biases where the model has them, else zero.
-    """
+    """Where passes or least squares linearise first."""
 
     C_nb: Floats
+    """Initial attitude, b to n, shape (3, 3)."""
     coefficients: Floats
+    """Shape (p,). SI; after a coarse alignment the biases where the model has them, else zero."""
 
 
 @compiled

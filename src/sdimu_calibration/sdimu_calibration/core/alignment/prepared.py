@@ -43,31 +43,22 @@ ALIGN_S = 30.0
 
 @dataclass(frozen=True)
 class TestSetup:
-    """Everything a pass needs that is not data.
-
-    Attributes
-    ----------
-    site, imu, model : Site, ImuSpecification, Model
-        The white noise of `imu` is that of means over `epoch_s`, quantisation included.
-    gravity : float
-        At the site (m/s^2).
-    epoch_s : float
-        Length of an epoch at rest (s).
-    counted : bool
-        A sensor counts pulses: what a second scatters then says nothing of the noise.
-    shaken : bool
-        The table vibrates at rest.
-    """
+    """Everything a pass needs that is not data."""
 
     site: Site
     imu: ImuSpecification
     model: Model
+    """`site`, `imu`, `model`: the white noise of `imu` is that of means over `epoch_s`, quantisation included."""
     sensors: ImuModel
     limits: RestLimits
     gravity: float
+    """At the site (m/s^2)."""
     epoch_s: float = EPOCH_S
+    """Length of an epoch at rest (s)."""
     counted: bool = False
+    """A sensor counts pulses: what a second scatters then says nothing of the noise."""
     shaken: bool = False
+    """The table vibrates at rest."""
 
     @property
     def magnetic_n(self) -> Floats:
@@ -82,29 +73,22 @@ class TestSetup:
 
 @dataclass(frozen=True)
 class PreparedData:
-    """A recording after reduction: cycles, epochs and their phases.
-
-    Attributes
-    ----------
-    kind : ndarray of int, shape (e,)
-        What each epoch measures (`measurement_kind`).
-    bridges : Bridges
-        What gaps in the data add to the noise.
-    seconds : tuple of Epochs and Phases, or None
-        Those of single seconds, where the epochs are longer only because the test is long.
-    shaking : float or None
-        Sigma of the mean rate of an epoch beyond white noise (rad/s) on a table that vibrates at rest; None on others.
-    """
+    """A recording after reduction: cycles, epochs and their phases."""
 
     cycles: Cycles
     epochs: Epochs
     phases: Phases
     kind: Ints
+    """What each epoch measures (`measurement_kind`), shape (e,)."""
     temperature: TemperatureLog | None
     bridges: Bridges
+    """What gaps in the data add to the noise."""
     faults: tuple[DataFault, ...] = ()
     seconds: tuple[Epochs, Phases] | None = None
+    """Those of single seconds, where the epochs are longer only because the test is long."""
     shaking: float | None = None
+    """Sigma of the mean rate of an epoch beyond white noise (rad/s) on a table that vibrates at rest; None on others.
+    """
 
     @property
     def rest(self) -> Bools:

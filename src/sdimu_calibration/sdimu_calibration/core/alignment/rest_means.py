@@ -17,21 +17,17 @@ BLOCK_EPOCHS = 20
 
 @dataclass(frozen=True)
 class Layout:
-    """Cycles of stops and blocks, as half-open ranges.
-
-    Attributes
-    ----------
-    stop_first, stop_last : ndarray of int, shape (k,)
-        First cycle of each stop, and one after its last: consecutive epochs that the phases mark as used.
-    block_first, block_last, block_stop : ndarray of int, shape (b,)
-        The same for each block of rest, and the stop it belongs to.
-    """
+    """Cycles of stops and blocks, as half-open ranges."""
 
     stop_first: Ints
     stop_last: Ints
+    """`stop_first`, `stop_last`: shape (k,). First cycle of each stop, and one after its last: consecutive epochs that
+    the phases mark as used."""
     block_first: Ints
     block_last: Ints
     block_stop: Ints
+    """`block_first`, `block_last`, `block_stop`: the same for each block of rest, and the stop it belongs to,
+    shape (b,)."""
 
 
 def layout(prepared: PreparedData) -> Layout:
@@ -53,21 +49,14 @@ def layout(prepared: PreparedData) -> Layout:
 
 @dataclass(frozen=True)
 class Rest:
-    """Means over the blocks of rest.
-
-    Attributes
-    ----------
-    seconds : ndarray, shape (b,)
-        Length of each block (s).
-    mean : ndarray, shape (b, 6)
-        Rate (rad/s) and force (m/s^2) as measured.
-    design : ndarray, shape (b, 6, p)
-        Change of the means per unit of each coefficient.
-    """
+    """Means over the blocks of rest."""
 
     seconds: Floats
+    """Length of each block (s), shape (b,)."""
     mean: Floats
+    """Rate (rad/s) and force (m/s^2) as measured, shape (b, 6)."""
     design: Floats
+    """Change of the means per unit of each coefficient, shape (b, 6, p)."""
 
 
 def rest_means(prepared: PreparedData, where: Layout, model: ImuModel, values: Floats) -> Rest:

@@ -67,27 +67,19 @@ less than half creep, and are stretched."""
 
 @dataclass(frozen=True)
 class BatchSolution:
-    """Where Gauss-Newton ended.
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (p,)
-        Frame of the prior.
-    covariance : ndarray, shape (p, p)
-    C_nb : ndarray, shape (k, 3, 3)
-        Attitude of every stop.
-    chi2 : float
-        Sum of squares of all whitened rows, priors too.
-    log_evidence : float
-        Logarithm of the probability density of the data.
-    """
+    """Where Gauss-Newton ended."""
 
     coefficients: Floats
+    """Frame of the prior, shape (p,)."""
     covariance: Floats
+    """Shape (p, p)."""
     C_nb: Floats
+    """Attitude of every stop, shape (k, 3, 3)."""
     chi2: float
+    """Sum of squares of all whitened rows, priors too."""
     dof: int
     log_evidence: float
+    """Logarithm of the probability density of the data."""
     steps: int
 
 

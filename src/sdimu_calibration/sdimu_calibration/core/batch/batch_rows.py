@@ -23,20 +23,15 @@ PER_STOP = 9
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Point about which the equations of k stops are linearised.
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (p,)
-    C_nb : ndarray, shape (k, 3, 3)
-    velocity, position : ndarray, shape (k, 3)
-        Velocity (m/s), and displacement from the known point (m).
-    """
+    """Point about which the equations of k stops are linearised."""
 
     coefficients: Floats
+    """Shape (p,)."""
     C_nb: Floats
+    """Shape (k, 3, 3)."""
     velocity: Floats
     position: Floats
+    """`velocity`, `position`: velocity (m/s), and displacement from the known point (m), shape (k, 3)."""
 
 
 def rest_weights(setup: TestSetup, seconds: Floats) -> Floats:

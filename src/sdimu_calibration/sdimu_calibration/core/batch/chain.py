@@ -18,51 +18,36 @@ from sdimu_calibration.core.arrays import Floats
 
 @dataclass(frozen=True)
 class Link:
-    """Whitened rows of one link: ``own @ y_k + common @ c + residual``, and those that couple y_k to y_(k+1).
-
-    Attributes
-    ----------
-    own, common, residual : ndarray, shapes (r, q), (r, p), (r,)
-        Rows of this link alone.
-    step_own, step_next, step_common, step_residual : ndarray, shapes (s, q), (s, q), (s, p), (s,)
-        Rows that couple it to the next link; s = 0 at the last.
-    """
+    """Whitened rows of one link: ``own @ y_k + common @ c + residual``, and those that couple y_k to y_(k+1)."""
 
     own: Floats
     common: Floats
     residual: Floats
+    """`own`, `common`, `residual`: rows of this link alone, shapes (r, q), (r, p), (r,)."""
     step_own: Floats
     step_next: Floats
     step_common: Floats
     step_residual: Floats
+    """`step_own`, `step_next`, `step_common`, `step_residual`: shapes (s, q), (s, q), (s, p), (s,). Rows that couple it
+    to the next link; s = 0 at the last."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Minimum of the sum of squares.
-
-    Attributes
-    ----------
-    links : ndarray, shape (k, q)
-        Unknowns of each link.
-    common : ndarray, shape (p,)
-        Common unknowns.
-    covariance : ndarray, shape (p, p)
-        Of the common unknowns.
-    chi2 : float
-        Sum of squares at the minimum.
-    dof : int
-        Rows minus unknowns.
-    log_det : float
-        Sum of the logarithms of the triangular factor's diagonal.
-    """
+    """Minimum of the sum of squares."""
 
     links: Floats
+    """Unknowns of each link, shape (k, q)."""
     common: Floats
+    """Common unknowns, shape (p,)."""
     covariance: Floats
+    """Of the common unknowns, shape (p, p)."""
     chi2: float
+    """Sum of squares at the minimum."""
     dof: int
+    """Rows minus unknowns."""
     log_det: float
+    """Sum of the logarithms of the triangular factor's diagonal."""
 
 
 def solve(links: list[Link]) -> Solution:

@@ -33,21 +33,15 @@ TABLE_FRAME = "table"
 
 @dataclass(frozen=True)
 class ClassicalSolution:
-    """Coefficients with the table's angles as reference.
-
-    Attributes
-    ----------
-    values, covariance : ndarray, shapes (p,) and (p, p)
-        SI, in the axes of the table.
-    C_start : ndarray, shape (3, 3)
-        Attitude of the platform at the start (table axes to n).
-    """
+    """Coefficients with the table's angles as reference."""
 
     values: Floats
     covariance: Floats
+    """`values`, `covariance`: SI, in the axes of the table, shapes (p,) and (p, p)."""
     chi2: float
     dof: int
     C_start: Floats
+    """Attitude of the platform at the start (table axes to n), shape (3, 3)."""
 
 
 def solve_classical(

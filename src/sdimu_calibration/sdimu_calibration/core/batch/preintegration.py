@@ -23,30 +23,21 @@ from sdimu_calibration.core.rotation import rotation_matrix, skew
 
 @dataclass(frozen=True)
 class Preintegration:
-    """Integral of one motion from rest to rest that starts at a given attitude with velocity zero.
-
-    Attributes
-    ----------
-    C_nb : ndarray, shape (3, 3)
-        Attitude at the end.
-    moved : ndarray, shape (6,)
-        Velocity (m/s) and change of position (m), N, E, D.
-    seconds : float
-        Length of the motion.
-    by_attitude : ndarray, shape (9, 3)
-        Change of attitude (rad), velocity (m/s) and position (m) at the end per small rotation in n at the start (rad).
-    by_coefficient : ndarray, shape (9, p)
-        Change per unit of each coefficient for which the samples are corrected.
-    noise : ndarray, shape (9, 9)
-        Covariance of attitude, velocity and position from white sensor noise.
-    """
+    """Integral of one motion from rest to rest that starts at a given attitude with velocity zero."""
 
     C_nb: Floats
+    """Attitude at the end, shape (3, 3)."""
     moved: Floats
+    """Velocity (m/s) and change of position (m), N, E, D, shape (6,)."""
     seconds: float
+    """Length of the motion."""
     by_attitude: Floats
+    """Change of attitude (rad), velocity (m/s) and position (m) at the end per small rotation in n at the start (rad),
+    shape (9, 3)."""
     by_coefficient: Floats
+    """Change per unit of each coefficient for which the samples are corrected, shape (9, p)."""
     noise: Floats
+    """Covariance of attitude, velocity and position from white sensor noise, shape (9, 9)."""
 
 
 @compiled

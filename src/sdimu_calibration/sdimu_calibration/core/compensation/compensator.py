@@ -108,7 +108,7 @@ class Compensated:
     """`omega_ib_b`, `f_ib_b`: rad/s, m/s^2, shape (n, 3)."""
     omega_covariance: Floats
     f_covariance: Floats
-    """`omega_covariance`, `f_covariance`: Shape (n, 3, 3). Of one sample: coefficients and white noise."""
+    """`omega_covariance`, `f_covariance`: shape (n, 3, 3). Of one sample: coefficients and white noise."""
 
 
 def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effect, ...]:

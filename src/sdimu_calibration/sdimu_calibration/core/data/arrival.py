@@ -52,35 +52,23 @@ _WRONG_STAMPS = 0.2
 
 
 class RawStatus(NamedTuple):
-    """Status messages.
-
-    Attributes
-    ----------
-    ns : ndarray of int, shape (m,)
-        Stamps (ns).
-    dwell : ndarray of bool, shape (m,)
-    stop : ndarray of int, shape (m,)
-        `UNNUMBERED` where the message names none.
-    """
+    """Status messages."""
 
     ns: Ints
+    """Stamps (ns), shape (m,)."""
     dwell: Bools
+    """Shape (m,)."""
     stop: Ints
+    """`UNNUMBERED` where the message names none, shape (m,)."""
 
 
 class RawTemperature(NamedTuple):
-    """Temperatures.
-
-    Attributes
-    ----------
-    ns : ndarray of int, shape (m,)
-        Stamps (ns).
-    value : ndarray, shape (m,)
-        deg C.
-    """
+    """Temperatures."""
 
     ns: Ints
+    """Stamps (ns), shape (m,)."""
     value: Floats
+    """deg C, shape (m,)."""
 
 
 M = TypeVar("M", RawStatus, RawTemperature)
@@ -88,28 +76,20 @@ M = TypeVar("M", RawStatus, RawTemperature)
 
 @dataclass(frozen=True)
 class RawTest:
-    """What the topics of a test brought, in the order of arrival.
-
-    Attributes
-    ----------
-    ns : ndarray of int, shape (n,)
-        header.stamp of the samples (ns).
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        Body rate and specific force, in the unit and sign of the messages.
-    where : str
-        File and topic of the IMU, for errors.
-    status_topic, temperature_topic : str
-        For notes.
-    """
+    """What the topics of a test brought, in the order of arrival."""
 
     ns: Ints
+    """header.stamp of the samples (ns), shape (n,)."""
     omega_ib_b: Floats
     f_ib_b: Floats
+    """`omega_ib_b`, `f_ib_b`: body rate and specific force, in the unit and sign of the messages, shape (n, 3)."""
     status: RawStatus | None = None
     temperature: RawTemperature | None = None
     where: str = IMU_TOPIC
+    """File and topic of the IMU, for errors."""
     status_topic: str = STATUS_TOPIC
     temperature_topic: str = TEMPERATURE_TOPIC
+    """`status_topic`, `temperature_topic`: for notes."""
 
 
 def until(raw: RawTest, ns: int) -> RawTest:
@@ -139,21 +119,14 @@ def _until(messages: M | None, ns: int) -> M | None:
 
 @dataclass(frozen=True)
 class Arranged:
-    """Which samples to use, and what was wrong with the others.
-
-    Attributes
-    ----------
-    rows : ndarray of int, shape (m,)
-        Indices in the order of their stamps.
-    counts : dict of str to int
-        By kind, as in `_COUNTS`.
-    notes : tuple of str
-        The same for people, one line each.
-    """
+    """Which samples to use, and what was wrong with the others."""
 
     rows: Stamps
+    """Indices in the order of their stamps, shape (m,)."""
     counts: dict[str, int]
+    """By kind, as in `_COUNTS`."""
     notes: tuple[str, ...]
+    """The same for people, one line each."""
 
 
 def arrange(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where: str) -> Arranged:

@@ -64,40 +64,27 @@ other times as much."""
 
 @dataclass(frozen=True)
 class Stated:
-    """What the user says of the numbers; None is to be recognised.
-
-    Attributes
-    ----------
-    accel, gyro : float or None
-        m/s^2 and rad/s of one unit, positive.
-    accel_sign, gyro_sign : int or None
-        1 or -1.
-    """
+    """What the user says of the numbers; None is to be recognised."""
 
     accel: float | None = None
     gyro: float | None = None
+    """`accel`, `gyro`: m/s^2 and rad/s of one unit, positive."""
     accel_sign: int | None = None
     gyro_sign: int | None = None
+    """`accel_sign`, `gyro_sign`: 1 or -1."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How the numbers are to be read: SI = factor * number.
-
-    Attributes
-    ----------
-    accel, gyro : float
-        Factors, with sign.
-    notes : tuple of str
-        What was recognised and is not what the message says, one line each; empty for SI of the usual sense.
-    turned : bool
-        The turns decided; False where no turn changes the direction of gravity.
-    """
+    """How the numbers are to be read: SI = factor * number."""
 
     accel: float
     gyro: float
+    """`accel`, `gyro`: factors, with sign."""
     notes: tuple[str, ...]
+    """What was recognised and is not what the message says, one line each; empty for SI of the usual sense."""
     turned: bool = True
+    """The turns decided; False where no turn changes the direction of gravity."""
 
 
 def recognise(t: Floats, w: Floats, f: Floats, stated: Stated) -> Reading:
@@ -205,21 +192,15 @@ def _turning(windows: Windows, enough: float) -> Ints:
 
 @dataclass(frozen=True)
 class Turns:
-    """Windows in which the IMU turned, and the rotation in each by every reading of the gyros.
-
-    Attributes
-    ----------
-    chosen : ndarray of int, shape (k,)
-    C : dict of float to ndarray, shape (k, 3, 3)
-        By factor.
-    w : ndarray, shape (n, 3)
-        Body rate as recorded.
-    """
+    """Windows in which the IMU turned, and the rotation in each by every reading of the gyros."""
 
     windows: Windows
     chosen: Ints
+    """Shape (k,)."""
     C: dict[float, Floats]
+    """By factor, shape (k, 3, 3)."""
     w: Floats
+    """Body rate as recorded, shape (n, 3)."""
 
     def misfit(self, reading: float, axes: Floats | None = None, share: float = 0.5) -> float:
         """Return what a reading leaves of the change of direction, as a share of it.
@@ -321,24 +302,16 @@ def _reading_notes(reading: float, stated: Stated) -> tuple[str, ...]:
 
 
 class TurnsFit(NamedTuple):
-    """With what the rates turn the force as it turns.
-
-    Attributes
-    ----------
-    factor : float or None
-        rad/s of one number, positive; None where no turn tells it.
-    left : float
-        Share of the change of gravity's direction that is left.
-    signs : tuple of int
-        1 or -1 of each gyro.
-    as_recorded : float
-        What is left with the signs as recorded, at best.
-    """
+    """With what the rates turn the force as it turns."""
 
     factor: float | None
+    """rad/s of one number, positive; None where no turn tells it."""
     left: float
+    """Share of the change of gravity's direction that is left."""
     signs: tuple[int, int, int]
+    """1 or -1 of each gyro."""
     as_recorded: float
+    """What is left with the signs as recorded, at best."""
 
 
 AS_RECORDED = (1, 1, 1)

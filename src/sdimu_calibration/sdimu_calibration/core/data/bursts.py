@@ -29,19 +29,13 @@ _USUAL = 0.98
 
 @dataclass(frozen=True)
 class Bursts:
-    """Stamps in bursts, and what they mean.
-
-    Attributes
-    ----------
-    ns : ndarray of int64, shape (n,)
-        Even stamps by the count of the samples (ns).
-    wait_s : float
-        Usual wait for a packet (s).
-    """
+    """Stamps in bursts, and what they mean."""
 
     ns: Ints
+    """Even stamps by the count of the samples (ns), shape (n,)."""
     rate_hz: float
     wait_s: float
+    """Usual wait for a packet (s)."""
 
     def __str__(self) -> str:
         """Say it in a line."""

@@ -14,29 +14,20 @@ from sdimu_calibration.core.specification import EPOCH_S
 
 @dataclass(frozen=True)
 class Epochs:
-    """Which cycles make an epoch, and the means over it.
-
-    Attributes
-    ----------
-    first, last : ndarray of int, shape (m,)
-        Cycles ``first:last``.
-    start, end : ndarray, shape (m,)
-        Seconds.
-    peak_rate : ndarray, shape (m,)
-        Largest cycle-mean body rate (rad/s).
-    f_mean : ndarray, shape (m, 3)
-        Mean specific force as measured (m/s^2).
-    w_mean : ndarray, shape (m, 3)
-        Mean body rate as measured (rad/s).
-    """
+    """Which cycles make an epoch, and the means over it."""
 
     first: Ints
     last: Ints
+    """`first`, `last`: cycles ``first:last``, shape (m,)."""
     start: Floats
     end: Floats
+    """`start`, `end`: seconds, shape (m,)."""
     peak_rate: Floats
+    """Largest cycle-mean body rate (rad/s), shape (m,)."""
     f_mean: Floats
+    """Mean specific force as measured (m/s^2), shape (m, 3)."""
     w_mean: Floats
+    """Mean body rate as measured (rad/s), shape (m, 3)."""
 
     def __len__(self) -> int:
         """Return the number of epochs."""

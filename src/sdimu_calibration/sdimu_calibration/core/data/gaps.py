@@ -58,19 +58,14 @@ _SHORT_S = 0.25
 
 @dataclass(frozen=True)
 class Bridges:
-    """What missing samples leave uncertain.
-
-    Attributes
-    ----------
-    white : ndarray, shape (e,)
-        Variance of the white noise of each epoch over that of a whole one.
-    angle, velocity : ndarray, shape (e,)
-        Sigma of the attitude (rad) and velocity (m/s) that each epoch adds, about every axis.
-    """
+    """What missing samples leave uncertain."""
 
     white: Floats
+    """Variance of the white noise of each epoch over that of a whole one, shape (e,)."""
     angle: Floats
     velocity: Floats
+    """`angle`, `velocity`: sigma of the attitude (rad) and velocity (m/s) that each epoch adds, about every axis,
+    shape (e,)."""
 
 
 def largest_acceleration(cycles: Cycles) -> float:

@@ -41,25 +41,17 @@ what an IMU of the file would show."""
 
 @dataclass(frozen=True)
 class RestsShown:
-    """What the rests show of an IMU.
-
-    Attributes
-    ----------
-    gyro_noise, accel_noise : float
-        White noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-    rate : float
-        Median size of the mean rate of a rest (rad/s): bias and Earth.
-    force_error : float
-        Median difference of the mean specific force of a rest from gravity (m/s^2).
-    largest_force_error : float
-        The largest of these differences (m/s^2).
-    """
+    """What the rests show of an IMU."""
 
     gyro_noise: float
     accel_noise: float
+    """`gyro_noise`, `accel_noise`: white noise (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     rate: float
+    """Median size of the mean rate of a rest (rad/s): bias and Earth."""
     force_error: float
+    """Median difference of the mean specific force of a rest from gravity (m/s^2)."""
     largest_force_error: float
+    """The largest of these differences (m/s^2)."""
 
     def __str__(self) -> str:
         """Return it in customary units."""

@@ -36,26 +36,19 @@ rests, whose scatter is not well known, has the same probability by Student's t.
 
 @dataclass(frozen=True)
 class EarthRate:
-    """What the rests say of the place.
-
-    Attributes
-    ----------
-    up_rate, up_sigma : float
-        Earth's rate along the measured upward force, and its one sigma (rad/s); NaN and inf when it is not seen.
-    gravity, gravity_sigma : float
-        Median of |f| at rest and what bias and scale factor may do to it (m/s^2).
-    stops : int
-        Rests that were used.
-    up_dof : float
-        Degrees of freedom of `up_sigma` (1): a scatter of few rests is not well known.
-    """
+    """What the rests say of the place."""
 
     up_rate: float
     up_sigma: float
+    """`up_rate`, `up_sigma`: Earth's rate along the measured upward force, and its one sigma (rad/s); NaN and inf when
+    it is not seen."""
     gravity: float
     gravity_sigma: float
+    """`gravity`, `gravity_sigma`: median of |f| at rest and what bias and scale factor may do to it (m/s^2)."""
     stops: int
+    """Rests that were used."""
     up_dof: float
+    """Degrees of freedom of `up_sigma` (1): a scatter of few rests is not well known."""
 
     @property
     def seen(self) -> bool:

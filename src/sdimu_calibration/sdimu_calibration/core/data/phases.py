@@ -44,21 +44,14 @@ it."""
 
 @dataclass(frozen=True)
 class RestLimits:
-    """What an IMU at rest can show at most.
-
-    Attributes
-    ----------
-    rate : float
-        Body rate (rad/s).
-    force : float
-        Deviation of |f| from gravity (m/s^2).
-    shaken : float
-        Rate of a cycle (rad/s) where the table says dwell and vibrates; 0 where it does not.
-    """
+    """What an IMU at rest can show at most."""
 
     rate: float
+    """Body rate (rad/s)."""
     force: float
+    """Deviation of |f| from gravity (m/s^2)."""
     shaken: float = 0.0
+    """Rate of a cycle (rad/s) where the table says dwell and vibrates; 0 where it does not."""
 
 
 def rest_limits(imu: ImuSpecification) -> RestLimits:
@@ -86,30 +79,20 @@ class PhaseState:
 
 @dataclass(frozen=True)
 class Phases:
-    """Phase of each epoch.
-
-    Attributes
-    ----------
-    dwell : ndarray of bool, shape (m,)
-        Table (or the IMU, where the table is silent) says rest and the IMU agrees.
-    used : ndarray of bool, shape (m,)
-        A measurement is taken.
-    first : ndarray of bool, shape (m,)
-        The first measurement after motion.
-    stop : ndarray of int, shape (m,)
-        Index of the stop.
-    contradicted : ndarray of bool, shape (m,)
-        The table says dwell while the IMU moves.
-    denied : ndarray of bool, shape (m,)
-        The table says rotating while the IMU rests.
-    """
+    """Phase of each epoch."""
 
     dwell: Bools
+    """Table (or the IMU, where the table is silent) says rest and the IMU agrees, shape (m,)."""
     used: Bools
+    """A measurement is taken, shape (m,)."""
     first: Bools
+    """The first measurement after motion, shape (m,)."""
     stop: Ints
+    """Index of the stop, shape (m,)."""
     contradicted: Bools
+    """The table says dwell while the IMU moves, shape (m,)."""
     denied: Bools
+    """The table says rotating while the IMU rests, shape (m,)."""
 
 
 def table_says(epochs: Epochs, log: PhaseLog | None) -> tuple[NDArray[np.int8], Ints]:

@@ -57,20 +57,14 @@ _BLOCK_S = 0.5
 
 @dataclass(frozen=True)
 class StaticIntervals:
-    """Rests of a recording.
-
-    Attributes
-    ----------
-    first, last : ndarray of int, shape (k,)
-        Samples ``first:last`` of each.
-    gyro_white_noise, accel_white_noise : float
-        Densities learned at rest (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-    """
+    """Rests of a recording."""
 
     first: Ints
     last: Ints
+    """`first`, `last`: samples ``first:last`` of each, shape (k,)."""
     gyro_white_noise: float
     accel_white_noise: float
+    """`gyro_white_noise`, `accel_white_noise`: densities learned at rest (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
 
     def __len__(self) -> int:
         """Return the number of rests."""

@@ -39,22 +39,15 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples in the order of arrival.
-
-    Attributes
-    ----------
-    ns : ndarray of int, shape (n,)
-        Stamps (ns).
-    omega, force : ndarray, shape (n, 3)
-        As recorded.
-    where : str
-        File and topic.
-    """
+    """Samples in the order of arrival."""
 
     ns: Ints
+    """Stamps (ns), shape (n,)."""
     omega: Floats
     force: Floats
+    """`omega`, `force`: as recorded, shape (n, 3)."""
     where: str
+    """File and topic."""
 
     def __getitem__(self, rows: Ints) -> Samples:
         """Return some of them."""
@@ -82,18 +75,12 @@ class Samples:
 
 @dataclass(frozen=True)
 class Split:
-    """Samples to leave out.
-
-    Attributes
-    ----------
-    out : ndarray of int, shape (m,)
-        Their rows.
-    note : str
-        Why, in a line.
-    """
+    """Samples to leave out."""
 
     out: Ints
+    """Their rows, shape (m,)."""
     note: str
+    """Why, in a line."""
 
 
 def in_blocks(rows: Ints) -> Ints:

@@ -33,18 +33,12 @@ periods and more in a rest, each axis at its own rate (4000 draws)."""
 
 
 class Sway(NamedTuple):
-    """How far an IMU moves about its mean at rest, beyond noise, one sigma.
-
-    Attributes
-    ----------
-    angle : ndarray, shape (k,)
-        rad.
-    speed : ndarray, shape (k,)
-        m/s.
-    """
+    """How far an IMU moves about its mean at rest, beyond noise, one sigma."""
 
     angle: Floats
+    """rad, shape (k,)."""
     speed: Floats
+    """m/s, shape (k,)."""
 
 
 def relaxed(recording: Recording) -> tuple[StaticIntervals, ...]:

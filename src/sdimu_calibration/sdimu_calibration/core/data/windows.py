@@ -35,31 +35,22 @@ _MOVING = np.radians(1.0)
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows without gaps, k of them, of m samples (a power of two).
-
-    Attributes
-    ----------
-    start, end : ndarray, shape (k,)
-        Seconds.
-    first : ndarray of int, shape (k,)
-        First sample of each.
-    length : int
-        Samples of a window.
-    up_first, up_last : ndarray, shape (k, 3)
-        Direction of the measured force at the edges, unit vectors.
-    w_mean, f_mean : ndarray, shape (k, 3)
-        Means, in the numbers of the recording.
-    """
+    """Windows without gaps, k of them, of m samples (a power of two)."""
 
     start: Floats
     end: Floats
+    """`start`, `end`: seconds, shape (k,)."""
     first: Ints
+    """First sample of each, shape (k,)."""
     length: int
+    """Samples of a window."""
     interval_s: float
     up_first: Floats
     up_last: Floats
+    """`up_first`, `up_last`: direction of the measured force at the edges, unit vectors, shape (k, 3)."""
     w_mean: Floats
     f_mean: Floats
+    """`w_mean`, `f_mean`: means, in the numbers of the recording, shape (k, 3)."""
 
     def __len__(self) -> int:
         """Return the number of windows."""

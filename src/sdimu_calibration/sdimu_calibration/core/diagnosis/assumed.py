@@ -27,7 +27,7 @@ class Assumed:
     coefficient: str
     label: str
     family: str
-    """`label`, `family`: Of the effect: that of all which moves the coefficient most."""
+    """`label`, `family`: of the effect: that of all which moves the coefficient most."""
     size: float
     """Size of the effect, if it is there: root mean square of what prior and data leave (SI)."""
     unit: str

@@ -74,7 +74,7 @@ class Diagnosis:
     """Of the model as given."""
     fit: Fit
     extended: Fit
-    """`fit`, `extended`: With the model as given, and with what was found added; the latter with doubt about its model.
+    """`fit`, `extended`: with the model as given, and with what was found added; the latter with doubt about its model.
     """
     before: Calibration
     after: Calibration

@@ -41,7 +41,7 @@ class Rung:
     """`log_likelihood`, `log_bayes_factor`, `nis_mean`, `held_out_rms`: Bayes factor against the rung before."""
     jump: float
     jump_velocity: float
-    """`jump`, `jump_velocity`: After turns: RMS of the velocity innovation at the first epoch of each stop, over its
+    """`jump`, `jump_velocity`: after turns: RMS of the velocity innovation at the first epoch of each stop, over its
     sigma and in m/s; NaN where nothing is navigated."""
     moved: tuple[tuple[str, float], ...]
     """Coefficients that moved against the rung before, in their sigmas, largest first."""

@@ -28,7 +28,7 @@ class TurnSeen:
     """Body axis, 0-2; None when it turned about several."""
     angle: float
     rate: float
-    """`angle`, `rate`: Signed angle (rad); rate in the middle of the turn (rad/s)."""
+    """`angle`, `rate`: signed angle (rad); rate in the middle of the turn (rad/s)."""
     minutes: float
 
 

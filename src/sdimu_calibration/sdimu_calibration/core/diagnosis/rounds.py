@@ -52,7 +52,7 @@ class Round:
     found: Search[LinearEvidence]
     left_before: FreeInputTest
     left_after: FreeInputTest
-    """`left_before`, `left_after`: What is left with nothing added, and with `found` added."""
+    """`left_before`, `left_after`: what is left with nothing added, and with `found` added."""
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:

@@ -34,14 +34,14 @@ class Scan:
     """Shape (q,). Estimate over sigma; 0 where not testable."""
     estimate: Floats
     sigma: Floats
-    """`estimate`, `sigma`: Shape (q,). SI; sigma is inf where not testable."""
+    """`estimate`, `sigma`: shape (q,). SI; sigma is inf where not testable."""
     retention: Floats
     """Share of the signature that the model leaves, shape (q,)."""
     smallest: Floats
     """Minimal detectable size (SI), shape (q,)."""
     J: Floats
     d: Floats
-    """`J`, `d`: Shape (q,). Information on each parameter (1/sigma^2, SI) and the information vector, given the model:
+    """`J`, `d`: shape (q,). Information on each parameter (1/sigma^2, SI) and the information vector, given the model:
     the estimate is d / J."""
 
 

@@ -22,7 +22,7 @@ class Finding:
     """As in `DataFault`; empty for what is no fault of samples."""
     start_s: float = float("nan")
     end_s: float = float("nan")
-    """`start_s`, `end_s`: Time of the first and the last sample (s)."""
+    """`start_s`, `end_s`: time of the first and the last sample (s)."""
 
 
 def screen(fit: Fit) -> tuple[Finding, ...]:

@@ -23,7 +23,7 @@ class Step:
     display_unit: str
     z: float
     threshold: float
-    """`z`, `threshold`: Score beside those before it, and what noise reaches."""
+    """`z`, `threshold`: score beside those before it, and what noise reaches."""
     estimate: float
     sigma: float
     """`estimate`, `sigma`: SI, with everything chosen up to this step."""
@@ -33,7 +33,7 @@ class Step:
     held_out_after: HeldOut
     held_out_gain: float
     held_out_error: float
-    """`held_out_gain`, `held_out_error`: Log score over all stops, and its standard error."""
+    """`held_out_gain`, `held_out_error`: log score over all stops, and its standard error."""
     alike: tuple[str, ...]
     """Labels of candidates that the data cannot tell from it."""
     moved: tuple[tuple[str, float], ...] = field(default=())

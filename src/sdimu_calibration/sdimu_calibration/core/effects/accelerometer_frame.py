@@ -41,7 +41,7 @@ class AccelerometerFrameModel:
 
     asked: ImuModel
     inner: ImuModel
-    """`asked`, `inner`: With p and q parameters."""
+    """`asked`, `inner`: with p and q parameters."""
     place: Ints
     """Shape (p,). Place of each parameter asked for among the inner ones; -1 for what is zero by definition."""
 

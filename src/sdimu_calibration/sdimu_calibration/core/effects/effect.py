@@ -225,7 +225,7 @@ class Timetable:
     """Seconds."""
     stops: tuple[tuple[int, float, float], ...]
     turns: tuple[tuple[int, float, float], ...]
-    """`stops`, `turns`: Index of the stop (of the stop before the turn), start and end (s)."""
+    """`stops`, `turns`: index of the stop (of the stop before the turn), start and end (s)."""
 
 
 Column = Callable[[Motion], Floats]

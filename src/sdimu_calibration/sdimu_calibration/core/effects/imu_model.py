@@ -29,7 +29,7 @@ class ImuModel:
     """Length p."""
     channel: Ints
     parameter: Ints
-    """`channel`, `parameter`: Sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column, shape (m,).
+    """`channel`, `parameter`: sensor axis (0-2 gyro, 3-5 accelerometer) and state of each regressor column, shape (m,).
     """
     prior: Floats
     """Shape (p,). One-sigma (SI) that the filter starts from; zero for a coefficient that is known."""

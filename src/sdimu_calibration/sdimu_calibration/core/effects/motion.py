@@ -28,7 +28,7 @@ class Motion:
 
     t: Floats
     dt: Floats
-    """`t`, `dt`: End and length of each cycle (s), shape (n,)."""
+    """`t`, `dt`: end and length of each cycle (s), shape (n,)."""
     w: Floats
     """Mean body rate against inertial space, in b (rad/s), shape (n, 3)."""
     f: Floats
@@ -43,11 +43,11 @@ class Motion:
     """True where the table stands still, shape (n,)."""
     temperature: Floats
     temperature_rate: Floats
-    """`temperature`, `temperature_rate`: Shape (n,). T - T0 (K) and rate (K/s); zero where no temperature is recorded.
+    """`temperature`, `temperature_rate`: shape (n,). T - T0 (K) and rate (K/s); zero where no temperature is recorded.
     T0 is `TemperatureLog.origin_degc`."""
     turned: Floats
     leant: Floats
-    """`turned`, `leant`: Shape (n, 3). Sign of the last turn about each axis, and of the last change of specific force
+    """`turned`, `leant`: shape (n, 3). Sign of the last turn about each axis, and of the last change of specific force
     along it; 0 before the first."""
     since_turn: Floats
     """Shape (n,). Time since the last turn ended (s); 0 in turns, infinite before the first."""

@@ -42,24 +42,17 @@ def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Start:
-    """Where a fit ended, for a fit of nearly the same model to begin.
-
-    Attributes
-    ----------
-    names : tuple of str, length p
-    coefficients : ndarray, shape (p,)
-        SI, in the frame in which the estimator works.
-    C_nb : ndarray, shape (3, 3) or (k, 3, 3)
-        Initial attitude, or that of every rest; b to n.
-    more : ndarray, shape (m,)
-        Whatever else the estimator learned (SI): of a handheld run the Earth's rate in n, then the three sigmas of
-        `handheld_fit.LinearisationPoint.extra`; of all others nothing.
-    """
+    """Where a fit ended, for a fit of nearly the same model to begin."""
 
     names: tuple[str, ...]
+    """Length p."""
     coefficients: Floats
+    """SI, in the frame in which the estimator works, shape (p,)."""
     C_nb: Floats
+    """Shape (3, 3) or (k, 3, 3). Initial attitude, or that of every rest; b to n."""
     more: Floats
+    """Shape (m,). Whatever else the estimator learned (SI): of a handheld run the Earth's rate in n, then the three
+    sigmas of `handheld_fit.LinearisationPoint.extra`; of all others nothing."""
 
     def coefficients_of(self, names: Sequence[str]) -> Floats:
         """Coefficients of another model, where this one has them.
@@ -79,27 +72,19 @@ class Start:
 
 @dataclass(frozen=True)
 class Fit(ABC):
-    """A finished fit of one model to one test.
-
-    Attributes
-    ----------
-    sensors : ImuModel
-        The sensor model that was asked for, p parameters.
-    reason : str
-        Why this estimator was taken.
-    doubt : ndarray, shape (q, q), or None
-        What models that the data leave open add to the covariance of the estimator's coefficients (SI); None where
-        nobody asked which they are.
-    moved : ndarray, shape (q,), or None
-        What these models add to the coefficients (SI).
-    """
+    """A finished fit of one model to one test."""
 
     test: PreparedTest
     model: Model
     sensors: ImuModel
+    """The sensor model that was asked for, p parameters."""
     reason: str = field(default="", kw_only=True)
+    """Why this estimator was taken."""
     doubt: Floats | None = field(default=None, kw_only=True)
+    """Shape (q, q). What models that the data leave open add to the covariance of the estimator's coefficients (SI);
+    None where nobody asked which they are."""
     moved: Floats | None = field(default=None, kw_only=True)
+    """What these models add to the coefficients (SI), shape (q,)."""
 
     estimator = ""
     """Name of the estimator."""

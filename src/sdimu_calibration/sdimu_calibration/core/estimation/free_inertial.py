@@ -47,26 +47,18 @@ estimator finds the way by itself."""
 
 @dataclass(frozen=True)
 class Drift:
-    """Errors of one free navigation, one row an epoch (k).
-
-    Attributes
-    ----------
-    t : ndarray, shape (k,)
-        Seconds of navigation.
-    position, velocity : ndarray, shape (k, 2)
-        North and east (m, m/s).
-    heading : ndarray, shape (k,)
-        Change of the azimuth error since the start (rad).
-    promised : ndarray, shape (k,)
-        One sigma of the horizontal distance that the fit itself expects (m); NaN where there is none.
-    """
+    """Errors of one free navigation, one row an epoch (k)."""
 
     name: str
     t: Floats
+    """Seconds of navigation, shape (k,)."""
     position: Floats
     velocity: Floats
+    """`position`, `velocity`: north and east (m, m/s), shape (k, 2)."""
     heading: Floats
+    """Change of the azimuth error since the start (rad), shape (k,)."""
     promised: Floats
+    """Shape (k,). One sigma of the horizontal distance that the fit itself expects (m); NaN where there is none."""
 
     @property
     def distance(self) -> Floats:
@@ -81,35 +73,25 @@ class Drift:
 
 @dataclass(frozen=True)
 class FreeInertialRun:
-    """Free navigations of one segment.
-
-    Attributes
-    ----------
-    drifts : tuple of Drift
-        Without compensation, then with each model.
-    """
+    """Free navigations of one segment."""
 
     segment: Segment
     drifts: tuple[Drift, ...]
+    """Without compensation, then with each model."""
 
 
 class Compensated(NamedTuple):
     """Cycles without the sensor errors of a fit, and how they change with its coefficients.
 
     Shapes: n cycles, m columns, q coefficients of the estimator.
-
-    Attributes
-    ----------
-    values : ndarray, shape (n, m)
-        Regressors of the corrected cycles (SI).
-    channel, parameter : ndarray of int, shape (m,)
-        Channel that a column changes, and the coefficient it belongs to.
     """
 
     cycles: Cycles
     values: Floats
+    """Regressors of the corrected cycles (SI), shape (n, m)."""
     channel: Ints
     parameter: Ints
+    """`channel`, `parameter`: channel that a column changes, and the coefficient it belongs to, shape (m,)."""
 
 
 class Navigator(Protocol):
@@ -168,19 +150,14 @@ class Navigator(Protocol):
 
 @dataclass(frozen=True)
 class Refit:
-    """A fit to a part of the recording.
-
-    Attributes
-    ----------
-    fit : Navigator
-        Of the same model: how it takes errors out of samples.
-    estimate, covariance : ndarray, shapes (q,) and (q, q)
-        Coefficients of the estimator by the part alone (SI); for a navigation with what noise with a memory adds there.
-    """
+    """A fit to a part of the recording."""
 
     fit: Navigator
+    """Of the same model: how it takes errors out of samples."""
     estimate: Floats
     covariance: Floats
+    """`estimate`, `covariance`: shapes (q,) and (q, q). Coefficients of the estimator by the part alone (SI); for a
+    navigation with what noise with a memory adds there."""
 
 
 def free_inertial_runs(

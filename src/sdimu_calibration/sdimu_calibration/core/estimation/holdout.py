@@ -31,30 +31,21 @@ _KEPT = 0.5
 
 @dataclass(frozen=True)
 class Segment:
-    """A part of a recording that the fit does not see, as indices of epochs.
-
-    Attributes
-    ----------
-    place : str
-        ``end`` or ``start``.
-    first : int
-        First epoch of the dwell that levels.
-    start, last : int
-        First epoch that is navigated, and one after the last.
-    seen : tuple of int
-        First epoch of the fit, and one after its last.
-    begin_s, levelled_s, length_s : float
-        Begin of navigation, length of levelling and of navigation.
-    """
+    """A part of a recording that the fit does not see, as indices of epochs."""
 
     place: str
+    """``end`` or ``start``."""
     first: int
+    """First epoch of the dwell that levels."""
     start: int
     last: int
+    """`start`, `last`: first epoch that is navigated, and one after the last."""
     seen: tuple[int, int]
+    """First epoch of the fit, and one after its last."""
     begin_s: float
     levelled_s: float
     length_s: float
+    """`begin_s`, `levelled_s`, `length_s`: begin of navigation, length of levelling and of navigation."""
 
 
 def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tuple[Segment, ...]:

@@ -69,24 +69,17 @@ NO_FIELD = (
 
 @dataclass(frozen=True)
 class NavigationFit(Fit):
-    """A fit by navigation.
-
-    Attributes
-    ----------
-    setup : TestSetup
-        With the sensor model of the estimator, q coefficients.
-    noise : NoiseEstimate or None
-        Noise with a memory that was learned; None where white noise was taken.
-    carried : mapping of str to object, or None
-        Cached properties that a fit by the same passes knows already.
-    """
+    """A fit by navigation."""
 
     setup: TestSetup
+    """With the sensor model of the estimator, q coefficients."""
     prepared: PreparedData
     alignment: Alignment
     solution: Solution[Pass] | Solution[SecondOrderPass]
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
+    """Noise with a memory that was learned; None where white noise was taken."""
     carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
+    """Cached properties that a fit by the same passes knows already."""
 
     def __post_init__(self, carried: Mapping[str, Any] | None) -> None:
         """Keep what is known."""

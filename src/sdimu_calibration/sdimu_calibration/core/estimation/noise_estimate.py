@@ -13,28 +13,19 @@ from sdimu_calibration.core.wording import Work
 
 @dataclass(frozen=True)
 class NoiseEstimate:
-    """Noise that was learned with the coefficients, and the coefficients in it.
-
-    Attributes
-    ----------
-    deviation : ndarray, shape (q,)
-        Coefficients of the estimator less those in white noise (SI).
-    covariance : ndarray, shape (q, q)
-        Of the coefficients in this noise.
-    gain : float
-        Log-likelihood over that of white noise.
-    nis : float
-        Mean of the squared residuals, whitened with all noise; 1 is right.
-    held_out_rms : float
-        RMS of the normalised prediction errors at stops left out one at a time.
-    """
+    """Noise that was learned with the coefficients, and the coefficients in it."""
 
     terms: tuple[NoiseTerm, ...]
     deviation: Floats
+    """Coefficients of the estimator less those in white noise (SI), shape (q,)."""
     covariance: Floats
+    """Of the coefficients in this noise, shape (q, q)."""
     gain: float
+    """Log-likelihood over that of white noise."""
     nis: float
+    """Mean of the squared residuals, whitened with all noise; 1 is right."""
     held_out_rms: float
+    """RMS of the normalised prediction errors at stops left out one at a time."""
 
     @property
     def note(self) -> Note:

@@ -39,16 +39,11 @@ def with_noise_learned(fit: F) -> F:
 
 @dataclass(frozen=True)
 class FoundNoise:
-    """Noise terms that the innovations of a fit ask for.
-
-    Attributes
-    ----------
-    evidence : LinearEvidence or None
-        About the fit, in white noise; None where nobody looked.
-    """
+    """Noise terms that the innovations of a fit ask for."""
 
     terms: tuple[NoiseTerm, ...] = ()
     evidence: LinearEvidence | None = None
+    """About the fit, in white noise; None where nobody looked."""
 
     def taken_by(self, fit: F) -> F:
         """Return the fit in this noise; as it is where there is none.

@@ -26,23 +26,16 @@ from sdimu_calibration.core.wording import Work
 
 @dataclass(frozen=True)
 class ReferenceFit(Fit):
-    """A fit whose residuals are those of a navigation about its coefficients.
-
-    Attributes
-    ----------
-    coefficients, coefficient_covariance : ndarray, shapes (p,) and (p, p)
-        SI, in `frame`.
-    summary : FitStatistics
-        Of the least squares.
-    about : NavigationFit
-        About the coefficients of this fit.
-    """
+    """A fit whose residuals are those of a navigation about its coefficients."""
 
     frame: str
     coefficients: Floats
     coefficient_covariance: Floats
+    """`coefficients`, `coefficient_covariance`: SI, in `frame`, shapes (p,) and (p, p)."""
     summary: FitStatistics
+    """Of the least squares."""
     about: NavigationFit
+    """About the coefficients of this fit."""
 
     @property
     def body_frame(self) -> str:

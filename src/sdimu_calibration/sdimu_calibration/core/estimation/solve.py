@@ -150,18 +150,12 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
 
 @dataclass(frozen=True)
 class Choice:
-    """An estimator, and why it is the one.
-
-    Attributes
-    ----------
-    estimator : str
-        One of `ESTIMATORS`.
-    reason : str
-        Part of a sentence for people.
-    """
+    """An estimator, and why it is the one."""
 
     estimator: str
+    """One of `ESTIMATORS`."""
     reason: str
+    """Part of a sentence for people."""
 
 
 def choose_estimator(test: PreparedTest, model: Model) -> Choice:

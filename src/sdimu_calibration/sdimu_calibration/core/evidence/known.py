@@ -166,7 +166,7 @@ class Standing:
     """Classes that the data leave open: labels, that of the one found first."""
     imu: str = ""
     site: str = ""
-    """`imu`, `site`: Their files as an option names them: names in config/ or paths."""
+    """`imu`, `site`: their files as an option names them: names in config/ or paths."""
 
 
 def class_of(found: Candidate, alike: Sequence[Candidate]) -> tuple[Candidate, ...]:

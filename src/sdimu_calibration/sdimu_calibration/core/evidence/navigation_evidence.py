@@ -65,7 +65,7 @@ class NavigationEvidence(LinearEvidence):
 
     epoch: Ints
     channel: Ints
-    """`epoch`, `channel`: Shape (N,). Of each row; channels 0-11 are position, velocity, rate, force, three each."""
+    """`epoch`, `channel`: shape (N,). Of each row; channels 0-11 are position, velocity, rate, force, three each."""
     known: KnownPass
     prepared: PreparedData
     latitude: float

@@ -98,7 +98,7 @@ class Epochs(NamedTuple):
 
     first: Ints
     last: Ints
-    """`first`, `last`: Cycles from `first` to before `last`, shape (e,)."""
+    """`first`, `last`: cycles from `first` to before `last`, shape (e,)."""
     kind: Ints
     """What each measures, shape (e,)."""
 
@@ -110,7 +110,7 @@ class Regressors(NamedTuple):
     """Columns, of n cycles, shape (n, m)."""
     channel: Ints
     parameter: Ints
-    """`channel`, `parameter`: Sensor axis and parameter of each column, shape (m,)."""
+    """`channel`, `parameter`: sensor axis and parameter of each column, shape (m,)."""
 
 
 class _Cycles(NamedTuple):

@@ -57,161 +57,113 @@ MEASURED = 12
 
 
 class PassInput(NamedTuple):
-    """Data of a pass: n cycles, e epochs, m regressor columns.
-
-    Attributes
-    ----------
-    dt : ndarray, shape (n,)
-        Length of each cycle (s).
-    alpha, upsilon, coning, sculling : ndarray, shape (n, 3)
-        As in `Cycles` (rad, m/s, rad, m/s).
-    first, last : ndarray of int, shape (e,)
-        First cycle of each epoch, and one after its last.
-    white : ndarray, shape (e,)
-        Variance of the white noise, a multiple of that of a complete epoch (1).
-    gap_angle, gap_velocity : ndarray, shape (e,)
-        Sigma that missing samples add on every axis (rad, m/s).
-    kind : ndarray of int, shape (e,)
-        ``SKIP`` to ``HELD_ALL`` of `alignment.prepared`.
-    restart : ndarray of bool, shape (e,)
-        Before the epoch navigation starts anew from the known point, at rest (`restarts`).
-    values : ndarray, shape (n, m)
-        Regressors (SI).
-    channel, parameter : ndarray of int, shape (m,)
-        Sensor axis and coefficient of each regressor.
-    """
+    """Data of a pass: n cycles, e epochs, m regressor columns."""
 
     dt: Floats
+    """Length of each cycle (s), shape (n,)."""
     alpha: Floats
     upsilon: Floats
     coning: Floats
     sculling: Floats
+    """`alpha`, `upsilon`, `coning`, `sculling`: as in `Cycles` (rad, m/s, rad, m/s), shape (n, 3)."""
     first: Ints
     last: Ints
+    """`first`, `last`: first cycle of each epoch, and one after its last, shape (e,)."""
     white: Floats
+    """Variance of the white noise, a multiple of that of a complete epoch (1), shape (e,)."""
     gap_angle: Floats
     gap_velocity: Floats
+    """`gap_angle`, `gap_velocity`: sigma that missing samples add on every axis (rad, m/s), shape (e,)."""
     kind: Ints
+    """``SKIP`` to ``HELD_ALL`` of `alignment.prepared`, shape (e,)."""
     restart: Bools
+    """Before the epoch navigation starts anew from the known point, at rest (`restarts`), shape (e,)."""
     values: Floats
+    """Regressors (SI), shape (n, m)."""
     channel: Ints
     parameter: Ints
+    """`channel`, `parameter`: sensor axis and coefficient of each regressor, shape (m,)."""
 
 
 class PassSettings(NamedTuple):
-    """Constants of a pass.
-
-    Attributes
-    ----------
-    reference : ndarray, shape (3,)
-        Latitude (rad), longitude (rad), height (m) of the known point.
-    gravity_excess : float
-        Gravity of the site minus normal gravity (m/s^2).
-    gyro_psd, accel_psd : float
-        White noise ((rad/s)^2/Hz, (m/s^2)^2/Hz).
-    extra_gyro, extra_accel : float
-        Variance of Zw and Zf beyond white noise ((rad/s)^2, (m/s^2)^2).
-    velocity_sigma, position_sigma : float
-        Sigma of Zv and Zp (m/s, m).
-    decay_rate, drive : ndarray, shape (p,)
-        Decay (1/s) and added variance per second, which fades too, of each coefficient.
-    closed_loop : bool
-        Feed attitude and coefficients back too, not only position and velocity.
-    shared_noise : bool
-        Model the cross-covariance M.
-    shaken : bool
-        The table vibrates at rest: the force of an epoch is that of its mean attitude, not of the one at its end.
-    """
+    """Constants of a pass."""
 
     reference: Floats
+    """Latitude (rad), longitude (rad), height (m) of the known point, shape (3,)."""
     gravity_excess: float
+    """Gravity of the site minus normal gravity (m/s^2)."""
     gyro_psd: float
     accel_psd: float
+    """`gyro_psd`, `accel_psd`: white noise ((rad/s)^2/Hz, (m/s^2)^2/Hz)."""
     extra_gyro: float
     extra_accel: float
+    """`extra_gyro`, `extra_accel`: variance of Zw and Zf beyond white noise ((rad/s)^2, (m/s^2)^2)."""
     velocity_sigma: float
     position_sigma: float
+    """`velocity_sigma`, `position_sigma`: sigma of Zv and Zp (m/s, m)."""
     decay_rate: Floats
     drive: Floats
+    """`decay_rate`, `drive`: decay (1/s) and added variance per second, which fades too, of each coefficient,
+    shape (p,)."""
     closed_loop: bool
+    """Feed attitude and coefficients back too, not only position and velocity."""
     shared_noise: bool
+    """Model the cross-covariance M."""
     shaken: bool = False
+    """The table vibrates at rest: the force of an epoch is that of its mean attitude, not of the one at its end."""
 
 
 class PassState(NamedTuple):
-    """State of a pass, of size s = 9 + p + 3; changed in place.
-
-    Attributes
-    ----------
-    x : ndarray, shape (s,)
-        Mean (SI).
-    P : ndarray, shape (s, s)
-        Covariance.
-    C_nb : ndarray, shape (3, 3)
-    velocity, position : ndarray, shape (3,)
-        N, E, D (m/s); latitude (rad), longitude (rad), height (m).
-    used : ndarray, shape (p,)
-        Coefficients in the compensation (SI).
-    """
+    """State of a pass, of size s = 9 + p + 3; changed in place."""
 
     x: Floats
+    """Mean (SI), shape (s,)."""
     P: Floats
+    """Covariance, shape (s, s)."""
     C_nb: Floats
+    """Shape (3, 3)."""
     velocity: Floats
     position: Floats
+    """`velocity`, `position`: shape (3,). N, E, D (m/s); latitude (rad), longitude (rad), height (m)."""
     used: Floats
+    """Coefficients in the compensation (SI), shape (p,)."""
 
 
 class PassOutput(NamedTuple):
     """Output of a pass, one row an epoch; k = e where the matrices are kept, else 0. SI units.
 
     Of the state the kept matrices have the first t rows: all s, or the NAV navigation errors.
-
-    Attributes
-    ----------
-    estimate : ndarray, shape (e, p)
-        Coefficients.
-    sigma : ndarray, shape (e, s)
-        Of every state.
-    innovation, normalised : ndarray, shape (e, 12)
-        Innovations and ``L^-1`` times them; NaN where not measured.
-    innovation_sigma : ndarray, shape (e, 12)
-        Predicted sigma of each innovation; NaN where not measured.
-    log_likelihood : ndarray, shape (e,)
-    nis : ndarray, shape (e, 4)
-        Squared normalised innovation of position, velocity, rate, force.
-    C_nb : ndarray, shape (e, 3, 3)
-        At the end of the epoch.
-    stride : int
-        Epochs between snapshots of the covariance.
-    covariance : ndarray, shape (ceil(e / stride), p, p)
-        Of the coefficients.
-    Phi : ndarray, shape (k, 9, 9)
-        Transition of the navigation errors; zero for those of position and velocity after a restart.
-    G : ndarray, shape (k, 9, p)
-        Their response to the coefficients; not kept (k, 9, 0) with the navigation errors alone.
-    H : ndarray, shape (k, 12, t)
-    L : ndarray, shape (k, 12, 12)
-        Lower Cholesky factor of the innovations' covariance.
-    K : ndarray, shape (k, t, 12)
-        Gain.
     """
 
     estimate: Floats
+    """Coefficients, shape (e, p)."""
     sigma: Floats
+    """Of every state, shape (e, s)."""
     innovation: Floats
     normalised: Floats
+    """`innovation`, `normalised`: shape (e, 12). Innovations and ``L^-1`` times them; NaN where not measured."""
     innovation_sigma: Floats
+    """Shape (e, 12). Predicted sigma of each innovation; NaN where not measured."""
     log_likelihood: Floats
+    """Shape (e,)."""
     nis: Floats
+    """Squared normalised innovation of position, velocity, rate, force, shape (e, 4)."""
     C_nb: Floats
+    """At the end of the epoch, shape (e, 3, 3)."""
     stride: int
+    """Epochs between snapshots of the covariance."""
     covariance: Floats
+    """Of the coefficients, shape (ceil(e / stride), p, p)."""
     Phi: Floats
+    """Shape (k, 9, 9). Transition of the navigation errors; zero for those of position and velocity after a restart."""
     G: Floats
+    """Shape (k, 9, p). Their response to the coefficients; not kept (k, 9, 0) with the navigation errors alone."""
     H: Floats
+    """Shape (k, 12, t)."""
     L: Floats
+    """Lower Cholesky factor of the innovations' covariance, shape (k, 12, 12)."""
     K: Floats
+    """Gain, shape (k, t, 12)."""
 
 
 def new_output(epochs: int, parameters: int, keep: bool, stride: int, navigation_only: bool = False) -> PassOutput:

@@ -49,24 +49,17 @@ class _State:
 
 @dataclass(frozen=True)
 class NoiseStates:
-    """Where the states of noise stand among the coefficients of a filter.
-
-    Attributes
-    ----------
-    wander : ndarray of int, shape (w,)
-        Places of the noise of single sensors.
-    mean : ndarray of int, shape (c,)
-        Places of the mean of the noise of each sensor over the rests so far.
-    adds : ndarray, shape (c, w)
-        1 where a state is noise of that sensor, else 0.
-    moved : ndarray, shape (p, p + w + c)
-        What is reported of p coefficients by all that are estimated: biases with the mean of their noise (1).
-    """
+    """Where the states of noise stand among the coefficients of a filter."""
 
     wander: Ints
+    """Places of the noise of single sensors, shape (w,)."""
     mean: Ints
+    """Places of the mean of the noise of each sensor over the rests so far, shape (c,)."""
     adds: Floats
+    """1 where a state is noise of that sensor, else 0, shape (c, w)."""
     moved: Floats
+    """Shape (p, p + w + c). What is reported of p coefficients by all that are estimated: biases with the mean of their
+    noise (1)."""
 
     def rested(self, state: PassState, share: float) -> None:
         """Take the noise at the end of an epoch at rest into the means, in place.

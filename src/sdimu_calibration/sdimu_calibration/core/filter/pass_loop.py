@@ -21,22 +21,15 @@ CONVERGED = 0.02
 
 @dataclass(frozen=True)
 class FinishedPass(ABC):
-    """A finished pass: where it was linearised, where it ended.
-
-    Attributes
-    ----------
-    C_start : ndarray, shape (3, 3)
-        Initial attitude about which it was linearised, b to n (dimensionless).
-    start, state : PassState
-        At the first sample, and after the last epoch.
-    output : PassOutput
-        One row an epoch.
-    """
+    """A finished pass: where it was linearised, where it ended."""
 
     C_start: Floats
+    """Initial attitude about which it was linearised, b to n (dimensionless), shape (3, 3)."""
     start: PassState
     state: PassState
+    """`start`, `state`: at the first sample, and after the last epoch."""
     output: PassOutput
+    """One row an epoch."""
     data: PassInput
 
     @property
@@ -66,27 +59,19 @@ AnyPass = TypeVar("AnyPass", bound=FinishedPass)
 
 @dataclass(frozen=True)
 class Ending:
-    """When passes hold on to position and velocity, and when they end.
-
-    Attributes
-    ----------
-    most : int
-        Number of passes at most.
-    settled : float
-        Movement of a coefficient (sigma) from which position and velocity are taken in.
-    most_loose : int
-        Number of the last pass after which another one may be made without them; then they are taken in whatever moves.
-    least : int
-        Number of passes with both at least.
-    near : float
-        Movement (sigma) up to which passes that ran out have converged.
-    """
+    """When passes hold on to position and velocity, and when they end."""
 
     most: int
+    """Number of passes at most."""
     settled: float
+    """Movement of a coefficient (sigma) from which position and velocity are taken in."""
     most_loose: int
+    """Number of the last pass after which another one may be made without them; then they are taken in whatever moves.
+    """
     least: int
+    """Number of passes with both at least."""
     near: float
+    """Movement (sigma) up to which passes that ran out have converged."""
 
 
 def until_nothing_moves(

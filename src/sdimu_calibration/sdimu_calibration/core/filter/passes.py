@@ -294,26 +294,19 @@ def coarse_pass(prepared: PreparedData, setup: TestSetup, start: Alignment) -> P
 
 @dataclass(frozen=True)
 class Solution(Generic[AnyPass]):
-    """A converged calibration with everything that led to it.
-
-    Attributes
-    ----------
-    first, last : FinishedPass
-        The pass whose estimate on the way is shown, and the converged one: of the filter the closed-loop pass (its
-        output: no regressors are kept), of second-order passes the last one, too.
-    passes : int
-        How many there were.
-    converged : bool
-        The coefficients stood still at the end.
-    """
+    """A converged calibration with everything that led to it."""
 
     setup: TestSetup
     prepared: PreparedData
     alignment: Alignment
     first: AnyPass
     last: AnyPass
+    """`first`, `last`: the pass whose estimate on the way is shown, and the converged one: of the filter the
+    closed-loop pass (its output: no regressors are kept), of second-order passes the last one, too."""
     passes: int
+    """How many there were."""
     converged: bool
+    """The coefficients stood still at the end."""
 
 
 def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: Floats) -> ImuModel:

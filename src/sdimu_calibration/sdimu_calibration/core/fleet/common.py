@@ -50,7 +50,7 @@ class CommonEffect:
     """Units that know it."""
     mean: float
     mean_sigma: float
-    """`mean`, `mean_sigma`: Over units."""
+    """`mean`, `mean_sigma`: over units."""
     spread: float
     """Standard deviation between units (maximum likelihood)."""
     largest_z: float

@@ -39,7 +39,7 @@ class RandomEffect:
     """Standard deviation tau."""
     low: float
     high: float
-    """`low`, `high`: Its interval at `LEVEL`."""
+    """`low`, `high`: its interval at `LEVEL`."""
     dof: int
     """Values less what was fitted."""
     q: float
@@ -52,7 +52,7 @@ class RandomEffect:
     """Its standard error."""
     slope: float = math.nan
     slope_sigma: float = math.nan
-    """`slope`, `slope_sigma`: Change of the values by unit of x; NaN without x."""
+    """`slope`, `slope_sigma`: change of the values by unit of x; NaN without x."""
 
     @property
     def mean_interval(self) -> tuple[float, float]:

@@ -22,14 +22,14 @@ class Line:
     """Largest size over axes and units (SI); NaN: not measured."""
     low: float = math.nan
     high: float = math.nan
-    """`low`, `high`: Its interval at 95 % (SI); NaN where the source says none."""
+    """`low`, `high`: its interval at 95 % (SI); NaN where the source says none."""
     rms: float = math.nan
     """Root mean square over axes and units (SI); NaN where that has no meaning."""
     of: str = ""
     """Coefficient and unit with the largest size."""
     recordings: int = 0
     units: int = 0
-    """`recordings`, `units`: How many it is from."""
+    """`recordings`, `units`: how many it is from."""
     method: str = ""
     """How it was found."""
     condition: str = ""

@@ -90,10 +90,10 @@ class Candidates:
 
     names: tuple[str, ...]
     display_units: tuple[str, ...]
-    """`names`, `display_units`: Length k."""
+    """`names`, `display_units`: length k."""
     estimates: Floats
     sigmas: Floats
-    """`estimates`, `sigmas`: Shape (m, k). SI, one row a unit; NaN where it does not know an effect."""
+    """`estimates`, `sigmas`: shape (m, k). SI, one row a unit; NaN where it does not know an effect."""
     correlations: Bytes
     """Of the estimates in each unit, times `common.STEPS`, shape (m, k, k)."""
 

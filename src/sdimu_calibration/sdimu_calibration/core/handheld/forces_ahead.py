@@ -16,7 +16,7 @@ class ForcesAhead(NamedTuple):
     """Over the sigmas of the fit, correlations of the axes of a rest included (1)."""
     error: Floats
     sigma: Floats
-    """`error`, `sigma`: Measured less predicted, and what it scatters by with the noise of the fit (m/s^2),
+    """`error`, `sigma`: measured less predicted, and what it scatters by with the noise of the fit (m/s^2),
     shape (k, 3)."""
 
 

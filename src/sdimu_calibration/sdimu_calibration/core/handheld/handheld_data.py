@@ -38,17 +38,17 @@ class HandheldRun:
 
     t: Floats
     seconds: Floats
-    """`t`, `seconds`: Middle and length of each rest (s), shape (k,)."""
+    """`t`, `seconds`: middle and length of each rest (s), shape (k,)."""
     mean: Floats
     """Mean rate (rad/s) and specific force (m/s^2) at each rest, as measured, shape (k, 6)."""
     cycles: Cycles
     first: Ints
     last: Ints
-    """`first`, `last`: Cycles of each turn, shape (k - 1,)."""
+    """`first`, `last`: cycles of each turn, shape (k - 1,)."""
     turn_s: Floats
     path: Floats
     gap: Floats
-    """`turn_s`, `path`, `gap`: Duration (s), angle summed over all ways (rad), and uncertainty (rad) of what gaps and
+    """`turn_s`, `path`, `gap`: duration (s), angle summed over all ways (rad), and uncertainty (rad) of what gaps and
     steps of the clock leave open of each turn, shape (k - 1,)."""
     temperature: TemperatureLog | None
     sway: Sway

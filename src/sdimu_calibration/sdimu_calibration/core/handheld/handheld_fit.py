@@ -67,10 +67,10 @@ class FitPriors:
     """Magnitude (m/s^2)."""
     earth_mean: Floats
     earth_sigma: Floats
-    """`earth_mean`, `earth_sigma`: Shape (3,). Prior of the Earth's rate in n (rad/s); the heading of n is free."""
+    """`earth_mean`, `earth_sigma`: shape (3,). Prior of the Earth's rate in n (rad/s); the heading of n is free."""
     gyro_white_noise: float
     accel_white_noise: float
-    """`gyro_white_noise`, `accel_white_noise`: Densities."""
+    """`gyro_white_noise`, `accel_white_noise`: densities."""
 
 
 @dataclass(frozen=True)

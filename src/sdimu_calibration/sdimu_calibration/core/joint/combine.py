@@ -71,7 +71,7 @@ class JointEstimate:
     """Shape (P, P)."""
     deviation: Floats
     deviation_sigma: Floats
-    """`deviation`, `deviation_sigma`: Of each power-on from `values` (SI), in the order of the columns that vary, and
+    """`deviation`, `deviation_sigma`: of each power-on from `values` (SI), in the order of the columns that vary, and
     their sigmas, shape (G, v)."""
     log_likelihood: float
     """Restricted: the parameters of the set are integrated over their priors."""

@@ -48,7 +48,7 @@ class Member:
     """``() -> PreparedTest``; another process can call it too."""
     serial: str = ""
     power_on: str = ""
-    """`serial`, `power_on`: Of the unit, and from which switching-on; empty power-on: one of its own."""
+    """`serial`, `power_on`: of the unit, and from which switching-on; empty power-on: one of its own."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Report:
     """Coefficients and candidates of this recording alone have its name behind theirs."""
     estimator: str
     reason: str
-    """`estimator`, `reason`: And why it was taken."""
+    """`estimator`, `reason`: and why it was taken."""
     imu: ImuSpecification
     """With the noise that the recording shows."""
     start: Start
@@ -109,7 +109,7 @@ class Report:
     """Coefficients as reported, length p."""
     values: Floats
     sigma: Floats
-    """`values`, `sigma`: Shape (p,). Of the recording's own fit (SI), in the frame of the report; empty for a fit about
+    """`values`, `sigma`: shape (p,). Of the recording's own fit (SI), in the frame of the report; empty for a fit about
     given coefficients."""
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = field(default=())

@@ -46,7 +46,7 @@ class InOneNoise:
     """With all parameters at zero, shape (k,)."""
     explained: float
     log_det: float
-    """`explained`, `log_det`: Share of the sum of squares that the noise takes with all parameters at zero, and log of
+    """`explained`, `log_det`: share of the sum of squares that the noise takes with all parameters at zero, and log of
     its determinant (1); up to what all noises of the recording have in common."""
     squares: float
     """Sum of squares in white noise (1)."""

@@ -54,7 +54,7 @@ class SetDiagnosis:
     findings: tuple[SetFinding, ...]
     before: Calibration
     after: Calibration
-    """`before`, `after`: With the model as given, and with what was found."""
+    """`before`, `after`: with the model as given, and with what was found."""
     threshold: float
     """Score that noise reaches in a scan."""
     advice: tuple[Advice, ...]

@@ -69,7 +69,7 @@ class SetSearch:
 
     before: SetFit
     after: SetFit
-    """`before`, `after`: With the model as given, and with what was found."""
+    """`before`, `after`: with the model as given, and with what was found."""
     chosen: tuple[Candidate, ...]
     """Effects in all recordings, the largest share of the misfit first."""
     z: tuple[float, ...]

@@ -37,7 +37,7 @@ class Places:
 
     start: Floats
     end: Floats
-    """`start`, `end`: Seconds after the start of the recording (s), shape (n,)."""
+    """`start`, `end`: seconds after the start of the recording (s), shape (n,)."""
     up: Floats
     """Shape (n, 3). Direction of the mean specific force in b: a unit vector."""
     temperature_degc: Floats

@@ -24,19 +24,13 @@ from sdimu_calibration.core.navigation.strapdown import Cycles
 
 @dataclass(frozen=True)
 class CorrectedCycles:
-    """Cycles without the sensor errors.
-
-    Attributes
-    ----------
-    seen : Motion
-        Its rate and force are those of the corrected cycles.
-    weight : ndarray, shape (n, 6, 6)
-        ``(I + S)^-1``: change of true rate and force per change of the measured ones.
-    """
+    """Cycles without the sensor errors."""
 
     cycles: Cycles
     seen: Motion
+    """Its rate and force are those of the corrected cycles."""
     weight: Floats
+    """Shape (n, 6, 6). ``(I + S)^-1``: change of true rate and force per change of the measured ones."""
 
 
 def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: Floats) -> CorrectedCycles:

@@ -30,32 +30,23 @@ GAP = 1.5
 
 @dataclass(frozen=True)
 class Cycles:
-    """Navigation cycles; every array has n rows, SI, body frame at the start of the cycle.
-
-    Attributes
-    ----------
-    t, dt : ndarray, shape (n,)
-        End and length (s).
-    alpha, upsilon : ndarray, shape (n, 3)
-        Integrals of body rate (rad) and specific force (m/s).
-    coning, sculling : ndarray, shape (n, 3)
-        Their corrections: rotation vector = alpha + coning; velocity increment =
-        upsilon + alpha x upsilon / 2 + ... + sculling (`velocity_increment`).
-    samples, lost : ndarray of int, shape (n,)
-        Samples in the cycle, and samples missing before them.
-    gap_angle : ndarray, shape (n, 3)
-        Angle bridged by interpolation where samples are missing (rad).
-    """
+    """Navigation cycles; every array has n rows, SI, body frame at the start of the cycle."""
 
     t: Floats
     dt: Floats
+    """`t`, `dt`: end and length (s), shape (n,)."""
     alpha: Floats
     upsilon: Floats
+    """`alpha`, `upsilon`: integrals of body rate (rad) and specific force (m/s), shape (n, 3)."""
     coning: Floats
     sculling: Floats
+    """`coning`, `sculling`: shape (n, 3). Their corrections: rotation vector = alpha + coning; velocity increment =
+    upsilon + alpha x upsilon / 2 + ... + sculling (`velocity_increment`)."""
     samples: Ints
     lost: Ints
+    """`samples`, `lost`: samples in the cycle, and samples missing before them, shape (n,)."""
     gap_angle: Floats
+    """Angle bridged by interpolation where samples are missing (rad), shape (n, 3)."""
 
     def __len__(self) -> int:
         """Return the number of cycles."""

@@ -98,41 +98,27 @@ def temperatures(log: TemperatureLog | None, t: Floats, causal: bool) -> tuple[F
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What is about the IMU during a test.
-
-    Attributes
-    ----------
-    latitude : float
-        Of the site (rad).
-    gravity : float
-        At the site (m/s^2).
-    temperature : TemperatureLog or None
-        None: nobody measured it.
-    magnetic_n : ndarray, shape (3,)
-        Magnetic field in NED (T).
-    """
+    """What is about the IMU during a test."""
 
     latitude: float
+    """Of the site (rad)."""
     gravity: float
+    """At the site (m/s^2)."""
     temperature: TemperatureLog | None = None
+    """None: nobody measured it."""
     magnetic_n: Floats = field(default_factory=MAGNETIC_FIELD.copy)
+    """Magnetic field in NED (T), shape (3,)."""
 
 
 @dataclass(frozen=True)
 class Correction:
-    """Sensor errors that are taken out of samples.
-
-    Attributes
-    ----------
-    coefficients : ndarray, shape (p,)
-        Of the model (SI).
-    near : ndarray, shape (n, m), or None
-        Regressors along nearly the same motion: the compensation begins with them.
-    """
+    """Sensor errors that are taken out of samples."""
 
     model: ImuModel
     coefficients: Floats
+    """Of the model (SI), shape (p,)."""
     near: Floats | None = None
+    """Shape (n, m). Regressors along nearly the same motion: the compensation begins with them."""
 
 
 def motion(

@@ -52,7 +52,7 @@ class Terms:
     """Relative error of the variances beyond their standard errors; 0 where the terms explain them."""
     worst_s: float = 0.0
     worst_ratio: float = 1.0
-    """`worst_s`, `worst_ratio`: Averaging time (s) at which the deviation exceeds that of the terms most, and by what
+    """`worst_s`, `worst_ratio`: averaging time (s) at which the deviation exceeds that of the terms most, and by what
     factor."""
 
     @property

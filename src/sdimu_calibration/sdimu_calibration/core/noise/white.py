@@ -30,10 +30,10 @@ class WhiteNoise:
 
     gyro: float
     accel: float
-    """`gyro`, `accel`: Root mean square of the three axes (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
+    """`gyro`, `accel`: root mean square of the three axes (rad/s/sqrt(Hz), m/s^2/sqrt(Hz))."""
     gyro_sigma: float
     accel_sigma: float
-    """`gyro_sigma`, `accel_sigma`: Standard errors."""
+    """`gyro_sigma`, `accel_sigma`: standard errors."""
     channels: tuple[float, ...]
     """Length 6. Of each sensor; gyros first."""
     rest_s: float

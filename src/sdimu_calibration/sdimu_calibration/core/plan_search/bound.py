@@ -40,7 +40,7 @@ class Bounds:
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    """`names`, `units`: Coefficients and their display units, length p."""
+    """`names`, `units`: coefficients and their display units, length p."""
     effect: tuple[str, ...]
     """Effect of each coefficient, length p."""
     covariance: Floats

@@ -41,7 +41,7 @@ class NextTurn:
     """Turns and the stops after them."""
     before: float
     after: float
-    """`before`, `after`: Significance in sigma by which the least separable pair differs, without and with the extra
+    """`before`, `after`: significance in sigma by which the least separable pair differs, without and with the extra
     turn."""
 
     @property

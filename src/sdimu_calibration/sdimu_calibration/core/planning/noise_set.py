@@ -31,7 +31,7 @@ class NoiseSet:
     """Whether the correlation of process and measurement noise is modelled."""
     level_sigma: float
     azimuth_sigma: float
-    """`level_sigma`, `azimuth_sigma`: Initial attitude (rad)."""
+    """`level_sigma`, `azimuth_sigma`: initial attitude (rad)."""
     reference: str = ""
     """Name of the published results that it was made to reproduce; empty for none."""
 

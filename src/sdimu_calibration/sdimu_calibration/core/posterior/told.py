@@ -39,7 +39,7 @@ class MemberShare:
     """Of the models that hold it."""
     value: float
     sigma: float
-    """`value`, `sigma`: Its size over these models (SI)."""
+    """`value`, `sigma`: its size over these models (SI)."""
     unit: str
     display_unit: str
 
@@ -69,7 +69,7 @@ class NoiseShare:
     """Geometric mean over these models (SI, `unit`)."""
     low: float
     high: float
-    """`low`, `high`: Ends of the interval of 95 % where the noise is told; NaN elsewhere."""
+    """`low`, `high`: ends of the interval of 95 % where the noise is told; NaN elsewhere."""
     unit: str
     axes: tuple[int, ...] = AXES
     """Sensors of the triad that have it: all but of an unknown function, which may be of some."""

@@ -30,7 +30,7 @@ class UnknownFunction:
     """Shape (n,)."""
     mean: Floats
     sigma: Floats
-    """`mean`, `sigma`: Shape (n, 3). Error of each axis and its sigma (SI); without its mean over the dwells, which is
+    """`mean`, `sigma`: shape (n, 3). Error of each axis and its sigma (SI); without its mean over the dwells, which is
     a bias, and of one of the attitude without what is linear in the force, which is in scale factors, misalignments and
     mass unbalances."""
     axes: tuple[int, ...] = AXES

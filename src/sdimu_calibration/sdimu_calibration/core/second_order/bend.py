@@ -21,18 +21,12 @@ from sdimu_calibration.core.recording import DivergedError
 
 @dataclass(frozen=True)
 class Bend:
-    """What the squares of coefficients that only priors decide add.
-
-    Attributes
-    ----------
-    mean : ndarray, shape (q,)
-        To the coefficients (SI).
-    covariance : ndarray, shape (q, q)
-        To their covariance (SI).
-    """
+    """What the squares of coefficients that only priors decide add."""
 
     mean: Floats
+    """To the coefficients (SI), shape (q,)."""
     covariance: Floats
+    """To their covariance (SI), shape (q, q)."""
 
 
 def bend(

@@ -70,20 +70,14 @@ class SecondOrderPass(FinishedPass):
     """A finished pass about exactly corrected samples, in the accelerometers' frame.
 
     The coefficients of its states are deviations from `reference`; its output keeps the covariances of `rows`.
-
-    Attributes
-    ----------
-    reference : ndarray, shape (q,)
-        Coefficients at which the samples were corrected (SI).
-    rows : ndarray of int, shape (j,)
-        First epoch of each piece of the pass (`run_stops`).
-    C_stop : ndarray, shape (k, 3, 3)
-        Attitude about which each stop was linearised, b to n.
     """
 
     reference: Floats
+    """Coefficients at which the samples were corrected (SI), shape (q,)."""
     rows: Ints
+    """First epoch of each piece of the pass (`run_stops`), shape (j,)."""
     C_stop: Floats
+    """Attitude about which each stop was linearised, b to n, shape (k, 3, 3)."""
     where: Layout
 
     @property
@@ -136,25 +130,17 @@ def firm_setup(setup: TestSetup) -> TestSetup:
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Samples corrected at a set of coefficients, and what they become when the coefficients change a little.
-
-    Attributes
-    ----------
-    reference : ndarray, shape (q,)
-        Coefficients (SI) at which the samples were corrected.
-    C_stop : ndarray, shape (k, 3, 3)
-        Attitude of every stop (b to n), levelled by its own corrected force.
-    seen : Motion
-        Motion along these attitudes, n cycles.
-    weight : ndarray, shape (n, 6, 6)
-        Change of corrected rate and force per change of the measured ones.
-    """
+    """Samples corrected at a set of coefficients, and what they become when the coefficients change a little."""
 
     reference: Floats
+    """Coefficients (SI) at which the samples were corrected, shape (q,)."""
     where: Layout
     C_stop: Floats
+    """Attitude of every stop (b to n), levelled by its own corrected force, shape (k, 3, 3)."""
     seen: Motion
+    """Motion along these attitudes, n cycles."""
     weight: Floats
+    """Change of corrected rate and force per change of the measured ones, shape (n, 6, 6)."""
     data: PassInput
 
 

@@ -53,7 +53,7 @@ class Waypoint:
     """From the start of the move (s)."""
     angles: tuple[float, ...]
     rates: tuple[float, ...]
-    """`angles`, `rates`: One for each joint (rad, rad/s)."""
+    """`angles`, `rates`: one for each joint (rad, rad/s)."""
 
 
 @dataclass(frozen=True)

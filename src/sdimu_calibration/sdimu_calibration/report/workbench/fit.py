@@ -57,7 +57,7 @@ class Fitted:
     """Without the history of its first pass."""
     prior: Floats
     mean: Floats
-    """`prior`, `mean`: Sigma and mean of each coefficient's prior (SI), shape (p,)."""
+    """`prior`, `mean`: sigma and mean of each coefficient's prior (SI), shape (p,)."""
     stated: Floats
     """One-sigma (SI) that the IMU's file, or physics, gives each coefficient, shape (p,)."""
     grid: data.Grid

@@ -27,7 +27,7 @@ class State:
     """Channel and stop that are looked at."""
     past: tuple[Setting, ...] = ()
     future: tuple[Setting, ...] = ()
-    """`past`, `future`: What undo and redo go to; the last one is the next to go to."""
+    """`past`, `future`: what undo and redo go to; the last one is the next to go to."""
     seen: tuple[Setting, ...] = field(default=(), compare=False)
     """Everything that was fitted in this page, for comparison; an undo does not forget it."""
     recording: str = ""

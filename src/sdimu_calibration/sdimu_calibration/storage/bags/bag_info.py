@@ -15,25 +15,17 @@ from sdimu_calibration.storage.bags.mcap_walk import DamagedError, McapWalk
 
 @dataclass
 class BagInfo:
-    """Content of a bag.
-
-    Attributes
-    ----------
-    types : dict of str to str
-        Type by topic.
-    counts : dict of str to int
-        Messages by topic.
-    first_ns, last_ns : int
-        First and last log time (ns); 0 without messages.
-    damaged : list of Path
-        Files that end before their footer; the bag itself where they are packed in it.
-    """
+    """Content of a bag."""
 
     types: dict[str, str] = field(default_factory=dict)
+    """Type by topic."""
     counts: dict[str, int] = field(default_factory=dict)
+    """Messages by topic."""
     first_ns: int = 0
     last_ns: int = 0
+    """`first_ns`, `last_ns`: first and last log time (ns); 0 without messages."""
     damaged: list[Path] = field(default_factory=list)
+    """Files that end before their footer; the bag itself where they are packed in it."""
 
     def extend(self, first_ns: int, last_ns: int) -> None:
         """Take in a span of log time."""

@@ -18,31 +18,22 @@ Stamps = Ints
 
 @dataclass(frozen=True)
 class BagContent:
-    """What the topics of a test hold.
-
-    Attributes
-    ----------
-    start_ns : int
-        Added to every stamp: the time (ns since 1970) at which the test began.
-    imu_ns : ndarray, shape (n,)
-        End of each sample's interval (ns after `start_ns`).
-    omega_ib_b, f_ib_b : ndarray, shape (n, 3)
-        Mean rate (rad/s) and specific force (m/s^2) over the interval, in the frame of the IMU.
-    status : (ndarray (m,), ndarray of bool (m,), ndarray of int (m,)) or None
-        Stamp (ns after `start_ns`), True for dwell, index of the stop.
-    joint_states : (ndarray (l,), tuple of str (k), ndarray (l, k), ndarray (l, k)) or None
-        Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s).
-    temperature : (ndarray (o,), ndarray (o,)) or None
-        Stamp (ns after `start_ns`), temperature (deg C).
-    """
+    """What the topics of a test hold."""
 
     start_ns: int
+    """Added to every stamp: the time (ns since 1970) at which the test began."""
     imu_ns: Stamps
+    """End of each sample's interval (ns after `start_ns`), shape (n,)."""
     omega_ib_b: Floats
     f_ib_b: Floats
+    """`omega_ib_b`, `f_ib_b`: mean rate (rad/s) and specific force (m/s^2) over the interval, in the frame of the IMU,
+    shape (n, 3)."""
     status: tuple[Stamps, Bools, Ints] | None = None
+    """Stamp (ns after `start_ns`), True for dwell, index of the stop."""
     joint_states: tuple[Stamps, tuple[str, ...], Floats, Floats] | None = None
+    """Stamp (ns after `start_ns`), axes, angles (rad), rates (rad/s)."""
     temperature: tuple[Stamps, Floats] | None = None
+    """Stamp (ns after `start_ns`), temperature (deg C)."""
 
 
 def write_recording(

@@ -38,19 +38,15 @@ class DamagedError(Exception):
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one chunk.
-
-    Attributes
-    ----------
-    channel, time_ns, start, length : ndarray of int, shape (n,)
-        Channel and log time of each message; where its bytes begin in `content`, and how many they are.
-    """
+    """Messages of one chunk."""
 
     content: bytes
     channel: Ints
     time_ns: Ints
     start: Ints
     length: Ints
+    """`channel`, `time_ns`, `start`, `length`: shape (n,). Channel and log time of each message; where its bytes begin
+    in `content`, and how many they are."""
 
     def __len__(self) -> int:
         """Return the number of messages."""

@@ -23,29 +23,20 @@ _NO_SCHEMA = Schema(0, b"", "", "")
 
 @dataclass
 class Salvage:
-    """What one file gave.
-
-    Attributes
-    ----------
-    damage : str
-        What was wrong; empty for a whole file, which is left as it is.
-    kept : Path or None
-        Where the cut file is now.
-    counts : dict of str to int
-        Messages saved, by topic.
-    first_ns, last_ns : int
-        First and last log time (ns) of the messages.
-    topics : dict of str to TopicEntry
-        For metadata.yaml.
-    """
+    """What one file gave."""
 
     path: Path
     damage: str = ""
+    """What was wrong; empty for a whole file, which is left as it is."""
     kept: Path | None = None
+    """Where the cut file is now."""
     counts: dict[str, int] = field(default_factory=dict)
+    """Messages saved, by topic."""
     first_ns: int = 0
     last_ns: int = 0
+    """`first_ns`, `last_ns`: first and last log time (ns) of the messages."""
     topics: dict[str, TopicEntry] = field(default_factory=dict)
+    """For metadata.yaml."""
 
 
 def recover(path: Path) -> tuple[Salvage, ...]:

@@ -15,24 +15,16 @@ from sdimu_calibration.storage.bags.raw_messages import RawMessages
 
 @dataclass(frozen=True)
 class Topics:
-    """Topics of a recording.
-
-    Attributes
-    ----------
-    imu : str
-        sensor_msgs/Imu; the only one that must be there.
-    status : str
-        diagnostic_msgs/DiagnosticArray of the rate table.
-    joint_states : str
-        sensor_msgs/JointState of the rate table.
-    temperature : str
-        sensor_msgs/Temperature of the IMU.
-    """
+    """Topics of a recording."""
 
     imu: str = "/imu/data_raw"
+    """sensor_msgs/Imu; the only one that must be there."""
     status: str = "/rate_table/status"
+    """diagnostic_msgs/DiagnosticArray of the rate table."""
     joint_states: str = "/rate_table/joint_states"
+    """sensor_msgs/JointState of the rate table."""
     temperature: str = "/imu/temperature"
+    """sensor_msgs/Temperature of the IMU."""
 
 
 _OWN = Topics()

@@ -27,7 +27,7 @@ class Certificate:
     operator: str = ""
     plan: str = ""
     version: str = ""
-    """`serial`, `date`, `operator`, `plan`, `version`: Unit, day of the certificate, person, test plan, version of the
+    """`serial`, `date`, `operator`, `plan`, `version`: unit, day of the certificate, person, test plan, version of the
     program."""
     recordings: tuple[tuple[str, str], ...] = ()
     """Name and SHA-256 of each file of the recordings; the second is empty where the file was not found."""

@@ -113,7 +113,7 @@ class SensorMap(Schema):
     """Column of the times, where it is not the common one."""
     counts_per_unit: Three = (1.0, 1.0, 1.0)
     bias: Three = (0.0, 0.0, 0.0)
-    """`counts_per_unit`, `bias`: Raw counts; the bias is the nominal one, such as half of the converter's range."""
+    """`counts_per_unit`, `bias`: raw counts; the bias is the nominal one, such as half of the converter's range."""
     sign: Annotated[tuple[Sign, Sign, Sign], BeforeValidator(_three)] = (1, 1, 1)
 
     @model_validator(mode="after")

@@ -31,7 +31,7 @@ class Imported:
     """Shape (n,). Stamps (ns since 1970), as the file has them: gaps, jitter and repetitions stay."""
     omega_ib_b: Floats
     f_ib_b: Floats
-    """`omega_ib_b`, `f_ib_b`: Shape (n, 3). rad/s, m/s^2; NaN where the file says so."""
+    """`omega_ib_b`, `f_ib_b`: shape (n, 3). rad/s, m/s^2; NaN where the file says so."""
     temperature: tuple[Stamps, Floats] | None
     """Stamps (ns), deg C."""
     notes: tuple[str, ...]
