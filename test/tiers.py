@@ -201,8 +201,13 @@ LONG = {
         "test_a_fault_of_one_recording_is_told_of_that_one",
         "test_taking_back_effects_keeps_the_fault_of_one_recording",
         "test_what_all_have_and_one_has_more_of_is_told_as_both",
+        "test_over_the_told_model_alone_coefficients_are_those_of_its_fit",
+        "test_over_all_models_no_coefficient_is_known_better_and_some_less_well",
         "test_a_weak_effect_is_found_in_all_recordings_together",
         "test_what_two_recordings_leave_open_the_advised_third_one_closes",
+    ),
+    "test/sdimu_calibration/core/posterior/test_coefficients.py": (
+        "test_half_of_an_equation_that_no_physics_names_moves_no_coefficient",
     ),
     "test/sdimu_calibration/core/noise/test_quantisation.py": (
         "test_what_a_counter_hides_is_found",
