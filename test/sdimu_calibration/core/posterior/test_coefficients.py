@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from sdimu_calibration.core.posterior.coefficients import Averages
 
@@ -45,6 +46,16 @@ def test_half_of_an_equation_that_no_physics_names_moves_no_coefficient(bench):
     # Without the equation in the model its size is zero, and all else the same.
     np.testing.assert_allclose((half.mean - 0.5 * (told.mean + without.mean)) / scale, 0.0, atol=1e-6)
     moved = (told.mean - without.mean) / scale
-    added = (half.covariance - told.covariance) / np.outer(scale, scale)
-    np.testing.assert_allclose(added, 0.25 * np.outer(moved, moved), atol=1e-6)
+    added = (half.covariance - told.covariance) / np.outer(scale, scale) - 0.25 * np.outer(moved, moved)
     assert np.abs(moved[free]).max() > 0.01
+    # Beside it as much as is seen of the equation, in equal parts on the coefficients of its sensor alone.
+    names = found.board.evidence.names[: len(scale)]
+    of_sensor = np.array(
+        [name.endswith(("accel_bias_z", "accel_scale_z")) or "accel_misalignment_z" in name for name in names]
+    )
+    np.testing.assert_allclose(added - np.diag(np.diag(added)), 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.diag(added)[~of_sensor], 0.0, atol=1e-6)
+    signal = 2.0 * np.diag(added) * scale**2 * np.diag(found.board.in_noise(model.noise).J)[: len(scale)]
+    z = diagnosis.found.steps[0].z
+    assert signal[of_sensor].sum() == pytest.approx(z**2, rel=0.05)
+    np.testing.assert_allclose(signal[of_sensor], signal[of_sensor].mean(), rtol=1e-6)

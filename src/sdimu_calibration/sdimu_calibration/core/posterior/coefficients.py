@@ -6,19 +6,22 @@ Each coefficient means the same in all models: a bias is that in the mean over t
 wanders there. Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
 
 An equation that no physics names shows what residuals look like, and not what its cause adds to the coefficients: with
-one probability it moves them as the equation does, with the other not at all.
+one probability it moves them as the equation does. With the other it does not, and another cause adds as much to the
+coefficients of that sensor as is seen of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
@@ -26,6 +29,7 @@ from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
+from sdimu_calibration.core.recording import DataError
 
 _MOST = 400
 """Number of models that are averaged at most, the likeliest first: those behind weigh less than a thousandth each."""
@@ -96,14 +100,40 @@ class Averages:
                 own[row, column] = one.covariance[channel, other]
         for place, (number, _) in enumerate(members, start=p):
             T[:, place] += self._shift(number)
-        mean = T @ estimate + constant
+        mean, covariance_of_all = T @ estimate + constant, T @ covariance @ T.T + own
         for place, (number, _) in enumerate(members, start=p):
             if not as_told and self._candidate(number).family == "own":
                 # What the coefficients are off by where the size of the equation is zero, all else as it is.
                 moved = T @ covariance[:, place] * estimate[place] / covariance[place, place]
                 mean = mean - (1.0 - _IS_THE_CAUSE) * moved
-                own = own + _IS_THE_CAUSE * (1.0 - _IS_THE_CAUSE) * np.outer(moved, moved)
-        return Moments(mean, T @ covariance @ T.T + own)
+                covariance_of_all += _IS_THE_CAUSE * (1.0 - _IS_THE_CAUSE) * np.outer(moved, moved)
+                seen = float(estimate[place] ** 2 / covariance[place, place])
+                covariance_of_all += (1.0 - _IS_THE_CAUSE) * np.diag(self._out_of_sight(number, seen, data.J))
+        return Moments(mean, covariance_of_all)
+
+    def _out_of_sight(self, number: int, seen: float, J: Floats) -> Floats:
+        """Variance of what another cause in the place of an equation adds to the coefficients of its sensor.
+
+        As much as is seen of it, in equal parts.
+
+        Parameters
+        ----------
+        seen : float
+            Squared significance of the equation (1).
+        J : ndarray, shape (k, k)
+            Information of each column alone, those of the q coefficients first (1/SI^2).
+
+        Returns
+        -------
+        ndarray, shape (q,)
+            SI squared; zero for the coefficients of other sensors.
+        """
+        names = self.board.evidence.names[: self.board.evidence.coefficients]
+        channel = self._candidate(number).effect.terms[0].channel
+        at = [k for k, name in enumerate(names) if channel_of(name) == channel and J[k, k] > 0.0]
+        out = np.zeros(len(names))
+        out[at] = seen / len(at) / np.diag(J)[at] if at else 0.0
+        return out
 
     def of(self, found: Posterior[E]) -> Moments:
         """Moments over all models."""
@@ -138,6 +168,15 @@ class Averages:
                 G = np.einsum("s,scr->cr", cut.in_dwells, one.R.reshape(cut.cells, 6, -1))
                 self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
         return self._noises[noise]
+
+
+@lru_cache(maxsize=1024)
+def channel_of(name: str) -> int | None:
+    """Sensor axis that a coefficient acts on, 0 to 5; None for one that the catalogue does not know."""
+    try:
+        return resolve(name).terms[0].channel
+    except DataError:
+        return None
 
 
 def drift_mean(effect: Effect, dwell_means: Callable[[Effect], Floats], names: Sequence[str]) -> Floats:
