@@ -100,16 +100,14 @@ class Averages:
                 own[row, column] = one.covariance[channel, other]
         for place, (number, _) in enumerate(members, start=p):
             T[:, place] += self._shift(number)
-        mean, covariance_of_all = T @ estimate + constant, T @ covariance @ T.T + own
+        told = Moments(T @ estimate + constant, T @ covariance @ T.T + own)
         for place, (number, _) in enumerate(members, start=p):
             if not as_told and self._candidate(number).family == "own":
                 # What the coefficients are off by where the size of the equation is zero, all else as it is.
                 moved = T @ covariance[:, place] * estimate[place] / covariance[place, place]
-                mean = mean - (1.0 - _IS_THE_CAUSE) * moved
-                covariance_of_all += _IS_THE_CAUSE * (1.0 - _IS_THE_CAUSE) * np.outer(moved, moved)
                 seen = float(estimate[place] ** 2 / covariance[place, place])
-                covariance_of_all += (1.0 - _IS_THE_CAUSE) * np.diag(self._out_of_sight(number, seen, data.J))
-        return Moments(mean, covariance_of_all)
+                told = _with_another_cause(told, moved, self._out_of_sight(number, seen, data.J))
+        return told
 
     def _out_of_sight(self, number: int, seen: float, J: Floats) -> Floats:
         """Variance of what another cause in the place of an equation adds to the coefficients of its sensor.
@@ -168,6 +166,21 @@ class Averages:
                 G = np.einsum("s,scr->cr", cut.in_dwells, one.R.reshape(cut.cells, 6, -1))
                 self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
         return self._noises[noise]
+
+
+def _with_another_cause(told: Moments, moved: Floats, hidden: Floats) -> Moments:
+    """Mix a model with an equation, and one in which another cause stands in the place of the equation.
+
+    Parameters
+    ----------
+    moved : ndarray, shape (q,)
+        What the equation adds to each coefficient (SI).
+    hidden : ndarray, shape (q,)
+        Variance of what the other cause adds (SI squared).
+    """
+    p = _IS_THE_CAUSE
+    spread = p * (1.0 - p) * np.outer(moved, moved) + (1.0 - p) * np.diag(hidden)
+    return Moments(told.mean - (1.0 - p) * moved, told.covariance + spread)
 
 
 @lru_cache(maxsize=1024)
