@@ -25,7 +25,10 @@ USED = ("sdimu-calibration", "rate-table-sim", "sdimu-sim")
 OWN = (*USED, "sdimu-study")
 SETS = {
     "run": ("what `sdimu` and its nodes need, and setuptools, which installs them from a clone", [*USED, "setuptools"]),
-    "extras": ("workbench, notebooks, pictures", ["sdimu-calibration[workbench,notebook,pictures]"]),
+    "extras": (
+        "workbench, notebooks, pictures, objects of MATLAB",
+        ["sdimu-calibration[workbench,notebook,pictures,matlab]"],
+    ),
     "campaigns": ("many runs at once: monte-carlo, hidden-campaign, study", ["sdimu-study"]),
     "test": ("style, types, tests", ["sdimu-calibration[test]"]),
     "build": ("colcon, as ROS users build", ["sdimu-calibration[build]"]),

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FILES = ("run", "extras", "campaigns", "test", "build", "docs")
 EXTRAS = {
     "run": ("",),
-    "extras": ("workbench", "notebook", "pictures"),
+    "extras": ("workbench", "notebook", "pictures", "matlab"),
     "campaigns": ("study",),
     "test": ("test",),
     "build": ("build",),
@@ -114,6 +114,8 @@ TOOLS = {
     "playwright",
     "colcon-core",
     "pandas",
+    "mat-io",
+    "h5py",
     "pytest",
     "numpydoc",
     "sphinx",

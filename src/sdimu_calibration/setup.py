@@ -41,6 +41,7 @@ EXTRAS = {
     "workbench": ["dash"],
     "notebook": ["pandas", "plotly"],
     "pictures": ["matplotlib"],
+    "matlab": ["mat-io"],
     "study": ["dask", "distributed", "matplotlib"],
     "test": [
         "AllanTools",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import struct
 import zlib
 from collections.abc import Callable, Hashable
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import pytest
 import yaml
 from scipy.io import savemat
 
@@ -39,6 +42,7 @@ from sdimu_calibration.storage.files.reference_file import read_reference, read_
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.importing.import_map import load_import_map
 from sdimu_calibration.storage.importing.importer import read_files
+from sdimu_calibration.storage.importing.map_proposal import propose_maps
 from sdimu_calibration.storage.opening import open_recording
 from sdimu_sim.temperature_file import load_temperature
 
@@ -295,9 +299,28 @@ def make_mat(compressed: bool) -> Callable[[Path], bytes]:
     return make
 
 
-def read_table(path: Path) -> Hashable:
+def make_timetable(version: str) -> Callable[[Path], bytes]:
+    def make(folder: Path) -> bytes:
+        index = pd.TimedeltaIndex(np.rint(table()[:, 0] * 1e3).astype("timedelta64[ms]"), name="t")
+        frame = pd.DataFrame(dict(zip(COLUMNS[1:], table()[:, 1:].T, strict=True)), index=index)
+        pytest.importorskip("matio").save_to_mat(
+            str(folder / "x.mat"), {"TT": frame, "T": frame.reset_index(drop=True)}, version=version
+        )
+        return (folder / "x.mat").read_bytes()
+
+    return make
+
+
+def read_timetable(path: Path) -> Hashable:
+    """Read a timetable by a map, and propose one."""
+    told(propose_maps, [path])
+    return read_table(path, "TT.")
+
+
+def read_table(path: Path, before: str = "") -> Hashable:
     chart = path.with_name("map.yaml")
-    chart.write_text(yaml.safe_dump(MAP))
+    words = yaml.safe_load(re.sub(r"\b(t|T|[ag][xyz])\b(?!:)", rf"{before}\1", yaml.safe_dump(MAP)))
+    chart.write_text(yaml.safe_dump(words))
     found = read_files([path], load_import_map(chart))
     return found.ns.tobytes(), found.omega_ib_b.tobytes(), found.f_ib_b.tobytes()
 
@@ -423,6 +446,8 @@ FORMATS: dict[str, Format] = {
     "NPZ": Format("x.npz", make_npz, damaged_bytes, read_table, lambda a, b: a == b),
     "MAT": Format("x.mat", make_mat(False), damaged_bytes, nothing(read_table)),
     "MAT, packed": Format("x.mat", make_mat(True), damaged_bytes, read_table, lambda a, b: a == b),
+    "MAT, timetable": Format("x.mat", make_timetable("v7"), damaged_bytes, read_timetable, lambda a, b: a == b),
+    "MAT, 7.3": Format("x.mat", make_timetable("v7.3"), damaged_bytes, nothing(read_timetable)),
     "import map": Format("m.yaml", made(yaml.safe_dump(MAP).encode()), damaged_text, read_map),
     "site": Format("s.yaml", shipped("site", "daejeon"), damaged_text, nothing(load_site)),
     "IMU": Format("i.yaml", shipped("imu", "dtg"), damaged_text, nothing(load_imu)),

@@ -15,6 +15,8 @@ _EXTRAS = {
     "pandas": "notebook",
     "matplotlib": "pictures",
     "PIL": "pictures",
+    "matio": "matlab",
+    "h5py": "matlab",
     "dask": "study",
     "distributed": "study",
 }
@@ -28,9 +30,12 @@ class ExtraError(DataError):
 def lacking(error: ImportError) -> ExtraError | None:
     """Say in one line what to install; None where no extra brings what could not be imported."""
     module = (error.name or "").partition(".")[0]
-    if module not in _EXTRAS:
-        return None
-    return ExtraError(f'this needs the package {module}: pip install "sdimu_calibration[{_EXTRAS[module]}]"')
+    return ExtraError(lacking_module(module)) if module in _EXTRAS else None
+
+
+def lacking_module(module: str) -> str:
+    """Say what to install for a module that an extra brings."""
+    return f'this needs the package {module}: pip install "sdimu_calibration[{_EXTRAS[module]}]"'
 
 
 def needed(module: str) -> Any:

@@ -355,14 +355,15 @@ def test_names_of_imus_make_names_of_files(tmp_path, hand):
 
 
 def test_arrays_are_listed_for_the_map_that_the_user_writes(tmp_path):
-    acc, t = np.zeros((7, 3)), np.arange(7.0)
-    savemat(tmp_path / "a.mat", {"imu": {"acc": acc, "t": t}})
-    np.savez(tmp_path / "a.npz", acc=acc, t=t)
-    for name, listed in (("a.mat", "imu.acc (7 x 3), imu.t (7)"), ("a.npz", "acc (7 x 3), t (7)")):
-        with pytest.raises(DataError) as error:
-            propose_maps([tmp_path / name])
-        assert listed in str(error.value)
-        assert "--map" in str(error.value)
+    for rows in (7, 70):
+        acc, t = np.zeros((rows, 3)), np.arange(float(rows))
+        savemat(tmp_path / "a.mat", {"imu": {"acc": acc, "t": t}})
+        np.savez(tmp_path / "a.npz", acc=acc, t=t)
+        for name, listed in (("a.mat", "imu.acc ({} x 3), imu.t ({})"), ("a.npz", "acc ({} x 3), t ({})")):
+            with pytest.raises(DataError) as error:
+                propose_maps([tmp_path / name])
+            assert listed.format(rows, rows) in str(error.value)
+            assert "--map" in str(error.value)
 
 
 @pytest.mark.filterwarnings("error")

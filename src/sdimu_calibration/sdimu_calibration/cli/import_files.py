@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
 
 def import_files(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE ...", help="CSV or other columns in text, MAT up to v7, NPZ.")
-    ],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE ...", help="CSV or other columns in text, MAT, NPZ.")],
     chart: Annotated[
         str | None,
         typer.Option(

@@ -1,6 +1,6 @@
 """A reader that trusts what a file says of itself, in a process of its own: it may end as it likes.
 
-`run` starts `ros1_converter` or `mat_reader`, which import nothing of this package, so that they start fast.
+`run` starts `ros1_converter` or `mat_reader`, which import little, so that they start fast.
 """
 
 from __future__ import annotations

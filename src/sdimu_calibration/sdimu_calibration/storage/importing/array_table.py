@@ -1,51 +1,87 @@
-"""A table in a file of arrays: MATLAB's MAT up to version 7, numpy's NPZ, or bare numbers as a map says."""
+"""A table in a file of arrays: MATLAB's MAT, numpy's NPZ, or bare numbers as a map says."""
 
 from __future__ import annotations
 
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.extras import lacking_module
 from sdimu_calibration.storage.bags.own_process import run
 from sdimu_calibration.storage.bags.unpacking import allowed
 from sdimu_calibration.storage.importing.import_map import BinaryMap
-from sdimu_calibration.storage.importing.mat_reader import OBJECT, PREFIX
+from sdimu_calibration.storage.importing.mat_objects import HEAD, is_newest
+from sdimu_calibration.storage.importing.mat_reader import CLOCK, OBJECT, PREFIX, UNIT
 from sdimu_calibration.storage.importing.text_file import LONGEST_TABLE
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-_HDF5_AT = 512
-_VERSION_7_3 = b"MATLAB 7.3"
 _READER = Path(__file__).with_name("mat_reader.py")
 _PATIENCE_S = 120.0
 """Time (s) that a MAT file may take: a gigabyte takes ten."""
-_REFERENCE = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?:\[(\d+)\])?")
+_MATIO = "matio"
+"""Module that reads objects of MATLAB, and its files of version 7.3."""
+_REFERENCE = re.compile(r"(.+?)(?:\[(\d+)\])?", re.DOTALL)
+
+
+class Told(NamedTuple):
+    """What a file of MATLAB says beside its numbers.
+
+    Attributes
+    ----------
+    objects : mapping of str to str
+        Class of each object that could not be read.
+    units : mapping of str to str
+        Units of arrays that are variables of a table.
+    clocks : mapping of str to str
+        Times of their rows, for arrays that are variables of a timetable.
+    """
+
+    objects: Mapping[str, str]
+    units: Mapping[str, str]
+    clocks: Mapping[str, str]
 
 
 class ArrayTable:
     """Columns of a file of arrays: ``name``, ``struct.name``, or ``name[2]`` for the second column of a matrix."""
 
-    def __init__(self, path: Path, arrays: Mapping[str, Any], objects: Mapping[str, str] | None = None) -> None:
+    def __init__(self, path: Path, arrays: Mapping[str, Any], told: Told | None = None) -> None:
         self.path = path
         self._arrays = {name: array for name, array in arrays.items() if not name.startswith("__")}
-        self._objects = dict(objects or {})
+        self._told = told or Told({}, {}, {})
 
     def floats(self, columns: Sequence[int | str]) -> Floats:
         """Read columns as numbers, shape (n, k); one matrix may hold all of them, either way round."""
-        parts = [self._array(column).astype(np.float64) for column in columns]
-        for column, part in zip(columns, parts, strict=True):
+        arrays = [self._array(column) for column in columns]
+        parts = [array.astype(np.float64) for array in arrays]
+        for column, array, part in zip(columns, arrays, parts, strict=True):
+            if array.dtype.kind == "M":
+                raise DataError(f"{self.path}: variable {column} holds dates, expected numbers")
             if len(part) != len(parts[0]):
                 raise DataError(
                     f"{self.path}: variable {column} has {len(part)} rows, {columns[0]} has {len(parts[0])}"
                 )
         return np.concatenate(parts, axis=1)
+
+    def matrices(self) -> dict[str, NDArray[Any]]:
+        """Return the variables that may be columns of an IMU, each shape (n, k), by name."""
+        names = [name for name, value in self._arrays.items() if _is_matrix(np.asarray(value))]
+        return {name: self._array(name) for name in names}
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit that a table of MATLAB states for a variable; empty where it states none."""
+        return self._told.units.get(name, "")
+
+    def clock_of(self, name: str) -> str:
+        """Return the variable with the times of a variable of a timetable; empty where it is none."""
+        return self._told.clocks.get(name, "")
 
     def place(self, column: int | str) -> int | str:
         """Return what tells a column from others."""
@@ -58,7 +94,7 @@ class ArrayTable:
         return ", ".join(f"{name} ({size})" if size else name for name, size in sizes.items()) or "(none)"
 
     def numbers(self, column: int | str) -> NDArray[Any]:
-        """Read one column in the type it has, shape (n,), so that integer stamps stay exact."""
+        """Read one column in the type it has, shape (n,), so that integer stamps and dates stay exact."""
         array = self._array(column)
         if array.shape[1] != 1:
             raise DataError(f"{self.path}: variable {column} has {array.shape[1]} columns, expected one")
@@ -70,33 +106,44 @@ class ArrayTable:
 
     def _array(self, column: int | str) -> NDArray[Any]:
         """Return a variable, or one column of it, as a matrix with samples in its rows."""
-        match = _REFERENCE.fullmatch(str(column))
-        value: Any = self._arrays.get(match.group(1)) if match else None
-        if match is None or value is None:
+        # In a table of MATLAB any text is a name, brackets too.
+        whole = str(column) in self._arrays
+        match = None if whole else _REFERENCE.fullmatch(str(column))
+        name = match.group(1) if match else str(column)
+        value: Any = self._arrays.get(name)
+        if value is None:
             self._refuse_object(str(column))
             there = ", ".join(sorted(self._arrays)) or "none"
             raise DataError(f"{self.path}: no variable '{column}' (there are: {there})")
         array = np.asarray(value)
-        if array.dtype.kind not in "iuf" or array.ndim not in {1, 2} or not array.size:
+        if not _is_matrix(array):
+            self._refuse_object(str(column))
             raise DataError(f"{self.path}: variable {column} is not a list or matrix of numbers")
         array = array[:, None] if array.ndim == 1 else array
         array = array.T if array.shape[0] < array.shape[1] else array
-        if match.group(2) is None:
+        if match is None or match.group(2) is None:
             return array
         place = int(match.group(2))
         if not 1 <= place <= array.shape[1]:
-            raise DataError(f"{self.path}: variable {match.group(1)} has {array.shape[1]} columns, no column {place}")
+            raise DataError(f"{self.path}: variable {name} has {array.shape[1]} columns, no column {place}")
         return array[:, place - 1 : place]
 
     def _refuse_object(self, column: str) -> None:
         """Say how numbers get out of an object of MATLAB: scipy reads its name and its class alone."""
-        for name, kind in self._objects.items():
-            if column.split(".", maxsplit=1)[0] == name or len(self._objects) == len(self._arrays):
+        objects = self._told.objects
+        for name, kind in objects.items():
+            if column.split(".", maxsplit=1)[0] == name or len(objects) == len(self._arrays):
+                here = "" if find_spec(_MATIO) else f"{lacking_module(_MATIO)}; or "
                 raise DataError(
-                    f"{self.path}: variable {name} is a MATLAB {kind}, which MATLAB alone can read; there: t = "
+                    f"{self.path}: variable {name} is a MATLAB {kind}, which cannot be read: {here}in MATLAB: t = "
                     f"{name}.Properties.RowTimes; s = struct('t', seconds(t - t(1)), 'data', {name}.Variables); "
                     f"save('{name}_numbers.mat', '-struct', 's', '-v7'); the columns are then t, data[1], data[2], ..."
                 )
+
+
+def _is_matrix(array: NDArray[Any]) -> bool:
+    """Whether an array is a list or matrix of numbers or dates."""
+    return array.dtype.kind in "iufM" and array.ndim in {1, 2} and array.size > 0
 
 
 def read_npz(path: Path) -> ArrayTable:
@@ -126,26 +173,32 @@ def _shaped(array: Any) -> NDArray[Any]:
 
 
 def read_mat(path: Path) -> ArrayTable | None:
-    """Read a MAT file of version 4 to 7; None when it is a matrix written as text.
+    """Read a MAT file; None when it is a matrix written as text.
 
-    The reader of scipy trusts what the file says of itself; it works in a process of its own, which may end as it
-    likes and gets the memory that the file may unpack to.
+    The readers trust what the file says of itself; they work in a process of their own, which may end as it likes and
+    gets the memory that the file may unpack to.
     """
     with path.open("rb") as stream:
-        head = stream.read(_HDF5_AT + len(_HDF5))
+        head = stream.read(HEAD)
     if not head:
         raise DataError(f"{path}: the file is empty")
-    if head[_HDF5_AT:] == _HDF5 or head.startswith((_HDF5, _VERSION_7_3)):
-        raise DataError(f"{path}: is a MAT file of version 7.3; save it in MATLAB with '-v7'")
-    if _is_text(head):
+    if is_newest(head) and not find_spec(_MATIO):
+        raise DataError(
+            f"{path}: is a MAT file of version 7.3: {lacking_module(_MATIO)}; or save it in MATLAB with '-v7'"
+        )
+    if not is_newest(head) and _is_text(head):
         return None
     with TemporaryDirectory(prefix="sdimu-") as folder:
         plain = Path(folder) / "plain.npz"
         run(_READER, path, plain, _most(path), _PATIENCE_S, "not a MAT file that can be read")
         with np.load(plain, allow_pickle=False) as content:
-            arrays = {name.removeprefix(PREFIX): content[name] for name in content.files}
-    objects = {name.removeprefix(OBJECT): str(arrays.pop(name)) for name in list(arrays) if name.startswith(OBJECT)}
-    return ArrayTable(path, arrays, objects)
+            entries = {name: content[name] for name in content.files}
+    arrays = {name.removeprefix(PREFIX): array for name, array in entries.items() if name.startswith(PREFIX)}
+    objects, units, clocks = (
+        {name.removeprefix(mark): str(word) for name, word in entries.items() if name.startswith(mark)}
+        for mark in (OBJECT, UNIT, CLOCK)
+    )
+    return ArrayTable(path, arrays, Told(objects, units, clocks))
 
 
 def _is_text(head: bytes) -> bool:

@@ -217,9 +217,12 @@ def _decimals(cells: NDArray[np.str_], digits: int) -> Stamps | None:
 
 
 def _from_numbers(table: ArrayTable, column: int | str, unit: str) -> Stamps:
-    if unit == ISO:
-        raise DataError(f"{table.path}: variable {column}: dates are read from text files only")
     values: NDArray[Any] = table.numbers(column)
+    if values.dtype.kind == "M":
+        # A date is one in every unit.
+        return np.asarray(values.astype("datetime64[ns]").astype(np.int64))
+    if unit == ISO:
+        raise DataError(f"{table.path}: variable {column} holds no dates; check time.unit")
     factor = Fraction(_ns_per(unit)).limit_denominator(10**6)
     if values.dtype.kind in "iu" and factor.denominator == 1:
         return np.asarray(values.astype(np.int64) * int(factor))

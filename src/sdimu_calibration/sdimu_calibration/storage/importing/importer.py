@@ -49,8 +49,8 @@ class Imported:
 def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
     """Read the files that a map describes.
 
-    `paths`: CSV (or any columns in text), MAT up to version 7, NPZ, bare numbers. Several files hold the parts that the
-    map names, or, where it names none, one stretch of time each, in this order.
+    `paths`: CSV (or any columns in text), MAT, NPZ, bare numbers. Several files hold the parts that the map names, or,
+    where it names none, one stretch of time each, in this order.
     """
     named = (
         chart.accel.file,

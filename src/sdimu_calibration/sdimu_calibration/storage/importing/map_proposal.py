@@ -13,9 +13,11 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.axes_and_units import AS_RECORDED
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.importing.array_columns import ArrayColumns, array_columns
 from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
 from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale, gyro_scale
 from sdimu_calibration.storage.importing.columns import Pair, changes, pairs_by_heading, sensors_by_heading
+from sdimu_calibration.storage.importing.import_map import ISO
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file, column_text
 from sdimu_calibration.storage.importing.time_column import TimeColumn, time_of
 from sdimu_calibration.storage.importing.unnamed_columns import pairs_by_numbers
@@ -44,42 +46,67 @@ class Proposal:
 def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     """Propose a map for each IMU in a file.
 
-    `paths`: files of one form; the first one is looked at. Raises DataError where the file holds no columns in text, or
-    they cannot be told.
+    `paths`: files of one form; the first one is looked at. Raises DataError where the file holds no columns of numbers,
+    or they cannot be told.
     """
     path = Path(paths[0])
     check_file(path)
-    _refuse_arrays(path)
-    table = TextTable(path)
-    table.leave_out_broken()
+    table = _table(path)
     numbers = table.numbers()
     numbers[~(np.abs(numbers) < _LARGEST)] = np.nan
     pairs, by = _pairs(table, numbers)
     if not pairs:
-        shown = ", ".join(table.headings[:12]) or f"{numbers.shape[1]} columns without headings"
+        shown = _shown(table) or f"{numbers.shape[1]} columns without headings"
         raise DataError(
             f"{path}: it is not clear which columns are the accelerometers and which the gyros ({shown}): {_WRITE}"
         )
-    time = time_of(table, numbers, [k for pair in pairs for k in (*pair.accel, *pair.gyro)])
+    taken = [k for pair in pairs for k in (*pair.accel, *pair.gyro)]
     suffixes = _suffixes([pair.name for pair in pairs])
-    return [_proposal(table, numbers, pair, time, (by, suffix)) for pair, suffix in zip(pairs, suffixes, strict=True)]
+    return [
+        _proposal(table, numbers, pair, _time(table, numbers, pair, taken), (by, suffix))
+        for pair, suffix in zip(pairs, suffixes, strict=True)
+    ]
 
 
 _PAGE = "doc/recordings.md, Import"
 _WRITE = f"write a map ({_PAGE}) and name it by --map"
 
 
-def _refuse_arrays(path: Path) -> None:
-    """Name the variables of a file of arrays, for the map that the user has to write."""
+def _shown(table: TextTable | ArrayColumns) -> str:
+    """Name what the user has to choose from."""
+    return ", ".join(table.headings[:12]) if isinstance(table, TextTable) else table.contents
+
+
+def _table(path: Path) -> TextTable | ArrayColumns:
+    """Open a file as a table of columns."""
     kind = path.suffix.lower()
     arrays = read_npz(path) if kind == ".npz" else read_mat(path) if kind == ".mat" else None
     if arrays is not None:
-        raise DataError(
-            f"{path}: a map is proposed for columns in text alone; here are the variables {arrays.contents()}: {_WRITE}"
-        )
+        columns = array_columns(arrays)
+        if columns is None:
+            raise DataError(f"{path}: no variable is a log of a sensor (there are: {arrays.contents()}): {_WRITE}")
+        return columns
+    table = TextTable(path)
+    table.leave_out_broken()
+    return table
 
 
-def _pairs(table: TextTable, numbers: Floats) -> tuple[list[Pair], str]:
+def _time(table: TextTable | ArrayColumns, numbers: Floats, pair: Pair, taken: Sequence[int]) -> TimeColumn:
+    """Find the clock of the gyros: a timetable says it itself."""
+    clock = _clock(table, pair.gyro[0])
+    if not clock or isinstance(table, TextTable):
+        return time_of(table, numbers, taken)
+    rate_hz, dates = table.clock(clock)
+    why = f"{clock}, {'dates' if dates else 'in s'}, by its timetable" + (f", {rate_hz:.5g} Hz" if rate_hz else "")
+    return TimeColumn(clock, ISO if dates else "s", rate_hz, why)
+
+
+def _clock(table: TextTable | ArrayColumns, column: int) -> str:
+    """Name the times that a timetable gives a column, from 0; empty where there are none."""
+    return "" if isinstance(table, TextTable) else table.clock_of(column)
+
+
+def _pairs(table: TextTable | ArrayColumns, numbers: Floats) -> tuple[list[Pair], str]:
     """Find the sensors, and say by what."""
     accel, gyro = sensors_by_heading(table.headings)
     try:
@@ -101,7 +128,9 @@ def _suffixes(names: Sequence[str]) -> list[str]:
     return [f"_{name}" if name and clean.count(name) == 1 else f"_imu{k}" for k, name in enumerate(clean, start=1)]
 
 
-def _proposal(table: TextTable, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]) -> Proposal:
+def _proposal(
+    table: TextTable | ArrayColumns, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]
+) -> Proposal:
     by, suffix = found
     path = table.path
     names = [table.name_of(k) for k in (*pair.accel, *pair.gyro)]
@@ -112,6 +141,7 @@ def _proposal(table: TextTable, numbers: Floats, pair: Pair, time: TimeColumn, f
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     rate_hz = time.rate_hz or _UNKNOWN_HZ
+    own = _clock(table, pair.accel[0])
     rates = gyro_scale(w, f * force.factor, rate_hz, pair.gyro_unit)
     words = [
         f"{path}: accelerometers {_listed(names[:3])} and gyros {_listed(names[3:])}, by {by}",
@@ -130,18 +160,20 @@ def _proposal(table: TextTable, numbers: Floats, pair: Pair, time: TimeColumn, f
         *(['decimal: ","'] if table.decimal == "," else []),
         f"time: {time.text(rate_hz)}",
         *_sensor("accel", names[:3], force),
+        *([f"  time: {column_text(own)}"] if own not in ("", time.column) else []),
         *_sensor("gyro", names[3:], rates),
     ]
     return Proposal(suffix, "\n".join(lines) + "\n", tuple(words))
 
 
-def _doubts(table: TextTable, numbers: Floats, columns: Sequence[int]) -> list[str]:
+def _doubts(table: TextTable | ArrayColumns, numbers: Floats, columns: Sequence[int]) -> list[str]:
     """Say what speaks against six columns; refuse those that hold hardly a number."""
     six, names = numbers[:, list(columns)], [table.name_of(k) for k in columns]
     without = int(np.count_nonzero(~np.isfinite(six).all(axis=1)))
     if 2 * without > len(six) or len(six) - without < 2:
-        # Where cells are no numbers this says which.
-        table.floats(names)
+        if isinstance(table, TextTable):
+            # Where cells are no numbers this says which.
+            table.floats(names)
         raise DataError(
             f"{table.path}: {len(six) - without} of {len(six)} lines hold a number in all of the columns "
             f"{_listed(names)}"
