@@ -48,6 +48,8 @@ LONG = {
         "test_all_data_are_ranked_as_the_first_scan_of_a_diagnosis_of_the_bag",
         "test_of_the_requests_that_wait_the_newest_alone_is_answered",
         "test_a_test_that_has_ended_leaves_diagnosis_and_report_where_they_are_wanted",
+        "test_a_worker_killed_in_mid_search_is_started_anew_and_answers_the_same",
+        "test_a_worker_killed_while_it_draws_answers_once",
     ),
     "test/sdimu_calibration/api/test_api.py": (
         "test_a_coefficient_knows_its_units",

@@ -239,14 +239,52 @@ def test_of_the_requests_that_wait_the_newest_alone_is_answered(raw, setup, whol
     assert answers[1].more == ("the end", "filter", whole.ranking[0].label)
 
 
-def test_a_worker_that_has_ended_is_told_once(setup):
-    worker = Worker(setup)
+def kill(worker: Worker) -> None:
     worker._process.kill()
     worker._process.wait()
+
+
+def test_a_worker_killed_in_mid_search_is_started_anew_and_answers_the_same(setup, whole):
+    told: list[str] = []
+    worker = Worker(setup, told.append)
+    try:
+        worker.ask(WorkerRequest(5, None))
+        kill(worker)
+        ((answer,), (picture,)) = wait_for(worker)
+        assert answer.diagnosis == whole
+        assert picture.request == answer.request
+    finally:
+        worker.close()
+    (line,) = told
+    assert "begins anew" in line
+
+
+def test_a_worker_killed_while_it_draws_answers_once(setup, whole):
+    worker = Worker(setup)
+    worker.ask(WorkerRequest(5, None))
+    try:
+        begun = time.monotonic()
+        while (answer := worker.answer()) is None:
+            assert time.monotonic() - begun < PATIENCE_S
+            time.sleep(0.001)
+        assert answer.diagnosis == whole
+        if not worker._pipe.poll():
+            kill(worker)
+        assert wait_for(worker)[0] == []
+    finally:
+        worker.close()
+
+
+def test_a_worker_that_ends_twice_is_told_once(setup):
+    worker = Worker(setup)
     worker.ask(WorkerRequest(1, None))
-    with pytest.raises(DataError, match="goes on without it"):
-        wait_for(worker)
+    kill(worker)
+    assert worker.answer() is None
+    kill(worker)
+    with pytest.raises(DataError, match="ended twice; the test goes on without it"):
+        worker.answer()
     assert worker.idle
+    assert worker.answer() is None
     worker.close()
 
 

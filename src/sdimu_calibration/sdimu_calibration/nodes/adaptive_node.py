@@ -67,7 +67,8 @@ class AdaptiveNode:
         if aside := put_aside(self._out / CHOICES):
             self.node.get_logger().warning(f"{self._out / CHOICES}: of an earlier test; kept as {aside}")
         self._goals, self._models, self._menu = aimed(goals, tell), (added,), Menu()
-        self._worker = Worker(WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False))
+        setup = WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False)
+        self._worker = Worker(setup, self.node.get_logger().warning)
         self._driving = Driving(self.node, self._act)
         self.done = self._driving.done
         self._choices = self.node.create_publisher(DiagnosticArray, "~/choice", HISTORY)

@@ -41,7 +41,7 @@ class Diagnosing:
         self, node: Node, setup: WorkerSetup | None, added: tuple[str, ...], warn: Callable[[str], None]
     ) -> None:
         self._node, self._warn = node, warn
-        self._worker = Worker(setup) if setup else None
+        self._worker = Worker(setup, node.get_logger().warning) if setup else None
         self._report = setup.report if setup else None
         self._models = [added]
         self._stop, self._rest_ns = 0, 0
