@@ -57,7 +57,9 @@ def test_other_names_are_refused_on_every_path(server, host, path):
 def test_a_page_of_another_site_is_refused(server):
     ask = {"Host": "127.0.0.1:8050", "Origin": "http://evil.example"}
     assert server.test_client().post("/_dash-update-component", headers=ask, json={}).status_code == 403
-    for origin in ("null", "http://evil.example@127.0.0.1:8050", "file://"):
+    # Other servers on this machine, at another port or name, are other sites to a browser.
+    neighbours = ("http://127.0.0.1:8888", "http://127.0.0.1", "http://localhost:8050")
+    for origin in ("null", "http://evil.example@127.0.0.1:8050", "file://", *neighbours):
         ask["Origin"] = origin
         assert server.test_client().post("/_dash-update-component", headers=ask, json={}).status_code == 403
     own = {"Host": "127.0.0.1:8050", "Origin": "http://127.0.0.1:8050"}

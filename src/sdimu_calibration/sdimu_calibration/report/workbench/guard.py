@@ -39,10 +39,12 @@ def guard(server: Flask, host: str) -> None:
 
     @server.before_request
     def refuse_strangers() -> None:
-        origin = request.headers.get("Origin")
-        asked = [f"//{request.headers.get('Host', '')}", *([origin] if origin else [])]
-        if not all(_name(address) in names for address in asked):
+        asked, origin = f"//{request.headers.get('Host', '')}", request.headers.get("Origin")
+        if _name(asked) not in names:
             abort(403, "Only this machine is answered.")
+        # A server on another port of this machine is another site, too.
+        if origin and (_name(origin) not in names or urlsplit(origin).netloc.lower() != asked[2:].lower()):
+            abort(403, "Only the page of this server is answered.")
 
     @server.after_request
     def keep_to_itself(response: Response) -> Response:
