@@ -423,3 +423,21 @@ def test_the_server_says_that_it_is_alive_and_to_this_machine_alone(app):
     client = app.server.test_client()
     assert client.get("/alive").status_code == 204
     assert client.get("/alive", headers={"Host": "elsewhere.example"}).status_code == 403
+
+
+def test_a_recording_that_was_changed_in_place_is_opened_anew(tmp_path):
+    """What the page shows, and the command that it gives away, are of the same file."""
+    (tmp_path / "a").mkdir()
+    file = tmp_path / "a" / "a_0.mcap"
+    file.write_bytes(b"one")
+    opened = []
+    shelf = RecordingCache(["a", "bare"], lambda name: opened.append(name) or object(), {"a": tmp_path / "a"})
+    first, bare = shelf.bench("a"), shelf.bench("bare")
+    assert shelf.bench("a") is first
+    file.write_bytes(b"two, of another length")
+    assert shelf.bench("a") is not first
+    assert shelf.bench("bare") is bare
+    file.unlink()
+    file.parent.rmdir()
+    shelf.bench("a")
+    assert opened == ["a", "bare", "a", "a"]

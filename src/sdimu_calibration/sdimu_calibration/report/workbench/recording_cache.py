@@ -8,13 +8,14 @@ from threading import Lock
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.workbench.fit import FitSession
+from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 
 _MOST_OPEN = 3
 """Recordings that stay open: each holds some 100 MB of reduced samples."""
 
 
 class RecordingCache:
-    """Recordings by name; a bench is made when one is first asked for.
+    """Recordings by name; a bench is made when one is first asked for, and anew once its file was changed.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class RecordingCache:
     ) -> None:
         self._names, self._make, self._places = tuple(names), make, places or {}
         self.options = tuple(options)
-        self._open: dict[str, FitSession] = {}
+        self._open: dict[str, tuple[FitSession, tuple[FileState, ...]]] = {}
         self._lock = Lock()
 
     @property
@@ -56,12 +57,26 @@ class RecordingCache:
         if wanted not in self._names:
             raise DataError(f"no recording '{wanted}' here (choose one of: {', '.join(self.names)})")
         with self._lock:
+            if wanted in self._open and self._open[wanted][1] != self._state(wanted):
+                # What the page shows, and the command that is taken home, are of the file that is there now.
+                del self._open[wanted]
             if wanted not in self._open:
+                # Before it is read: what changes while it is read is read anew.
+                state = self._state(wanted)
                 bench = self._make(wanted)
                 while len(self._open) >= _MOST_OPEN:
                     self._open.pop(next(iter(self._open)))
-                self._open[wanted] = bench
-            return self._open[wanted]
+                self._open[wanted] = bench, state
+            return self._open[wanted][0]
+
+    def _state(self, name: str) -> tuple[FileState, ...]:
+        """Return what tells that a recording was changed in place; empty where it has no place."""
+        place = self._places.get(name)
+        try:
+            return () if place is None else file_states(place)
+        except OSError:
+            # It changes at this moment.
+            return ()
 
 
 def neighbours(path: Path) -> dict[str, Path]:
