@@ -191,6 +191,7 @@ def _damaged(tmp_path, key, value):
         (("history", "dwell"), [2] * 7, "history.dwell: a list of numbers"),
         (("fit", "held_out_rms"), [1, 2], "(fit.held_out_rms: a number is expected)"),
         (("fit", "held_out_rms"), "loud", "(fit.held_out_rms: a number is expected)"),
+        (("fit", "nis_mean"), 10**400, "(fit.nis_mean: a number is expected that 64 bits can hold)"),
         (("fit", "held_out_rms"), True, "(fit.held_out_rms: a number is expected)"),
         (("data", "duration_s"), "600", "(data.duration_s: a number is expected)"),
     ],

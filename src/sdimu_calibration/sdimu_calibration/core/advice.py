@@ -32,6 +32,7 @@ class Kind(StrEnum):
     """Ratios of measured to specified noise: gyro, accelerometer (1)."""
     UNKNOWN_CAUSE = auto()
     """Stop and channel where it acts most, None where none does; whether noise took it in."""
+    RECORD_MORE = auto()
     RUN_BACKWARDS = auto()
     RECORD_IN_OTHER_ORDER = auto()
     TRY_EQUATION = auto()

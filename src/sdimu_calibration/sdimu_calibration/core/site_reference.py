@@ -43,15 +43,18 @@ class Reference:
         """Say what the data make of a reference that has a sigma, on one line."""
         unit = self.display_unit
         sigma, off, left = (from_si(v, unit) for v in (self.sigma, self.told - self.value, self.value_sigma))
+        known = f", from +- {sigma:.3g} {unit}" if sigma else ""
         return (
-            f"{self.words} was estimated, too, from +- {sigma:.3g} {unit}: what was told is too large by {off:.3g} +- "
+            f"{self.words} was estimated, too{known}: what was told is too large by {off:.3g} +- "
             f"{left:.3g} {unit}; all sigmas take that into account"
         )
 
 
 def relative_line(references: Sequence[Reference]) -> str:
     """Say which sigmas are relative to what is told; empty where none are."""
-    parts = [f"{', '.join(r.relative)} to {r.words}" for r in references if r.relative and not r.sigma]
+    parts = [
+        f"{', '.join(r.relative)} to {r.words}" for r in references if r.relative and not (r.sigma or r.value_sigma)
+    ]
     return f"sigmas are relative to the site as told: {'; '.join(parts)}" if parts else ""
 
 

@@ -65,6 +65,9 @@ def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]
         size = float(np.sqrt(before.covariance[at[name], at[name]]))
         k = after.names.index(name)
         known = from_si(float(np.sqrt(after.covariance[k, k])), units[name])
+        if abs(sigmas) * from_si(size, units[name]) <= known:
+            # What it is off by is known no better than that.
+            continue
         out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], known, -sigmas))
     return tuple(out)
 

@@ -23,15 +23,12 @@ _HEAD = ("", "probability", "", "size if it is this")
 
 
 def odds_section(
-    told: Probabilities | None,
-    where: str = "in this test",
-    averaged: bool = True,
-    found: Mapping[str, str] | None = None,
+    told: Probabilities | None, where: str = "in this test", found: Mapping[str, str] | None = None
 ) -> str:
     """Return the section; empty where there are no probabilities.
 
-    `where`: what the data are of, as it ends a sentence; `averaged`: coefficients and sigmas of the page are means over
-    the models; `found`: sizes in words of what the page tells as found, by label: a size stands on a page once.
+    `where`: what the data are of, as it ends a sentence; `found`: sizes in words of what the page tells as found, by
+    label: a size stands on a page once.
     """
     sizes = found or {}
     if told is None:
@@ -51,14 +48,14 @@ def odds_section(
         if families or told.nothing > 0.5
         else "No family of effects is more probable than 5 %: many explain about the same. "
     )
-    means = "Coefficients and sigmas of this page are means over these models." if averaged else ""
     return section(
         "How probable each cause is",
         f'<div class="wide"><table class="odds"><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table>'
         "</div>",
         quiet(
             f"{rest}Summed over all models that the data leave probable {where}, weighed with how usual each is. "
-            f"Of a family, each member is listed; several effects may be missing at once. {means}"
+            f"Of a family, each member is listed; several effects may be missing at once. "
+            "Coefficients and sigmas of this page are means over these models."
         ),
     )
 

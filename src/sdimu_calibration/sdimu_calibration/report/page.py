@@ -119,7 +119,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
     parts = [
         _first(calibration, contents, fit, draw),
         coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
-        odds_section(of_set.probabilities, "in these recordings", averaged=False) if of_set is not None else "",
+        odds_section(of_set.probabilities, "in these recordings") if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         unknown_section(of_set.unknown, draw) if of_set is not None else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),

@@ -87,6 +87,8 @@ def _no_step(diagnosis: Diagnosis) -> str:
     standing = int(np.sum(np.abs(diagnosis.found.first.z) > diagnosis.found.threshold))
     if standing and not diagnosis.adequate:
         return f"Nothing was added to this model; {standing} of the candidates below stand out of the noise."
+    if not diagnosis.adequate:
+        return "Nothing was added to this model: no effect by itself is likely enough."
     return "No candidate stands out of the noise: the model stays as it is."
 
 

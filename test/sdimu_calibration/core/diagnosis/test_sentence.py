@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.advice import Kind
-from sdimu_calibration.core.diagnosis.advice import advice
+from sdimu_calibration.core.diagnosis.advice import advice, handheld_advice
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
-from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
+from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding
@@ -111,10 +111,31 @@ def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):
     d = replace(summary.diagnosis, verdict=Verdict.CLASS_OF_EFFECTS, found=nothing_chosen)
     vars(d)["probabilities"] = Probabilities(0.4, families, ())
     assert sentence(d, ()) == (
-        "Something is missing (60 %), but no effect is probable: accel_cubic_z 30 %, accel_quadratic_z 20 %."
+        "Something is missing (60 %), but no effect by itself is likely: accel_cubic_z 30 %, accel_quadratic_z 20 %."
     )
     (turns,) = [one for one in advice(d, (), (), plan_seen(d.navigation)) if one.kind == Kind.RANK_TURNS]
     assert turns.about == ("accel_cubic_z", "accel_quadratic_z")
+    assert Kind.RECORD_MORE in {one.kind for one in advice(d, (), (), plan_seen(d.navigation))}
+    assert Kind.RECORD_MORE in {one.kind for one in handheld_advice(d, ())}
+
+
+def test_members_of_one_recording_and_very_many_of_them_are_said_in_words():
+    one = MemberShare("gyro_bias_x@r2", 0.2, 1.0, 0.1, "rad/s", "deg/h")
+    # Of the family .45, most in members that are no more likely than one in a hundred.
+    family = FamilyShare("gyro_bias", "gyro_x", 0.45, (one,))
+    assert something_missing(Probabilities(0.3, (family,), ())).endswith(": gyro_bias_x in r2 alone 20 %.")
+    none = replace(family, members=())
+    assert something_missing(Probabilities(0.3, (none,), ())) == (
+        "Something is missing (70 %), but none of very many effects by itself is likely."
+    )
+
+
+def test_a_set_whose_search_came_to_no_end_is_not_called_consistent(summary):
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
+    fit = SimpleNamespace(function=None)
+    assert verdict_of_set(SetFacts([], after, fit, None, None)) == Verdict.UNEXPLAINED
+    assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.9, (), ()))) == Verdict.CONSISTENT
+    assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.4, (), ()))) == Verdict.CLASS_OF_EFFECTS
 
 
 def test_a_coefficient_of_one_recording_is_named_with_it():

@@ -93,10 +93,8 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
     if d.verdict == Verdict.UNEXPLAINED:
         return _about_unknown(d, found)
     out = add([one for one in found if _belongs(one)], d.probabilities)
-    if not found and d.verdict == Verdict.CLASS_OF_EFFECTS and d.probabilities is not None:
-        likely = [family.members[0].label for family in d.probabilities.families if family.members]
-        names = tuple(name for name in likely if _in_catalogue(name))[:2]
-        return [Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)] if len(names) > 1 else []
+    if not found and d.verdict == Verdict.CLASS_OF_EFFECTS:
+        out += _about_many(d)
     for one in found:
         if one.candidate.family == references.LATITUDE.name:
             out.append(Advice(Kind.CORRECT_LATITUDE, (one.value, one.sigma)))
@@ -110,6 +108,15 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
         if _in_sight(one):
             out.append(_at_stake(one))
     return out
+
+
+def _about_many(d: Diagnosis) -> list[Advice]:
+    """Advise where something is missing, and no effect by itself is likely."""
+    families = d.probabilities.families if d.probabilities is not None else ()
+    labels = [family.members[0].label for family in families if family.members]
+    names = tuple(label for label in labels if _in_catalogue(label))[:2]
+    turns = [Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)] if len(names) > 1 else []
+    return [Advice(Kind.RECORD_MORE), *turns]
 
 
 def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
@@ -236,6 +243,8 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...
     ]
     if d.verdict == Verdict.UNEXPLAINED:
         out.append(Advice(Kind.RECORD_IN_OTHER_ORDER))
+    if not found and d.verdict == Verdict.CLASS_OF_EFFECTS:
+        out.append(Advice(Kind.RECORD_MORE))
     return tuple(dict.fromkeys(out))
 
 

@@ -20,7 +20,7 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
 from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise
-from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise, searched
+from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO, Round, in_found_noise, searched
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
@@ -44,11 +44,6 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Option
 
-_TO_AND_FRO = (
-    "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
-    "these one is named, and another may be right"
-)
-"""Finding where the search did not come to an end by itself."""
 NOT_DIAGNOSABLE = (
     "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
     f"no missing effect; diagnose with another {Option.ESTIMATOR} (in Python estimator=...)"
@@ -240,7 +235,7 @@ def _findings(base: Fit, widened: Fit, done: Round) -> tuple[Finding, ...]:
     # Beside what was found a prior may no longer stand against the data: the fit of the model as given tells it.
     odd = [*base.contradicted_priors(), *widened.beyond_specification()]
     findings = (*screen(base), *(Finding(text, grave=False) for text in odd))
-    findings += () if done.found.stood else (Finding(_TO_AND_FRO, grave=False),)
+    findings += () if done.found.stood else (Finding(TO_AND_FRO, grave=False),)
     return findings if widened.converged else (*findings, Finding(NOT_CONVERGED, grave=True))
 
 

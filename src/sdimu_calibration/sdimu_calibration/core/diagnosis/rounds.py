@@ -30,6 +30,11 @@ from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, 
 from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
 from sdimu_calibration.core.progress import Progress
 
+TO_AND_FRO = (
+    "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
+    "these one is named, and another may be right"
+)
+"""Finding where the search did not come to an end by itself."""
 UNEXPLAINED_P = 1e-3
 """Probability of the free-input test below which what is left is not noise: one sound test in a thousand is there."""
 MOST_ROUNDS = 4

@@ -14,7 +14,7 @@ from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
-from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.candidate import OF_RECORDING, Candidate
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
@@ -112,8 +112,16 @@ def nothing_missing(told: Probabilities | None) -> str:
 
 def something_missing(told: Probabilities) -> str:
     """Say that something is missing where no effect by itself is probable: the likeliest, each with its probability."""
-    likely = ", ".join(f"{f.members[0].label} {in_percent(f.probability)}" for f in told.families[:LISTED] if f.members)
-    return f"Something is missing ({in_percent(1.0 - told.nothing)}), but no effect is probable: {likely}."
+    members = sorted((one for f in told.families for one in f.members), key=lambda one: -one.probability)
+    likely = ", ".join(f"{_of_recording(one.label)} {in_percent(one.probability)}" for one in members[:LISTED])
+    which = f"no effect by itself is likely: {likely}" if likely else "none of very many effects by itself is likely"
+    return f"Something is missing ({in_percent(1.0 - told.nothing)}), but {which}."
+
+
+def _of_recording(label: str) -> str:
+    """Write a label, that of one recording with its name in words."""
+    key, _, recording = label.partition(OF_RECORDING)
+    return f"{key} in {recording} alone" if recording else key
 
 
 def _consistent(d: Diagnosis) -> str:

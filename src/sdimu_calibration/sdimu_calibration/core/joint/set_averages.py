@@ -9,9 +9,9 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.averaged import none_below_zero
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.joint.set_board import SetBoard
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences
+from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
-from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
+from sdimu_calibration.core.posterior.coefficients import Averages
 from sdimu_calibration.core.posterior.posterior import Posterior
 
 
@@ -26,21 +26,18 @@ def over_all_models(fit: SetFit, window: Posterior[SetEvidence], base: Fit) -> S
         Of the recording in whose frame the result stands: a bias is that in the mean over its dwells.
     """
     board = window.board
-    if not isinstance(board, SetBoard) or set(board.known) != set(fit.names):
+    if not isinstance(board, SetBoard):
         return fit
-    evidence = board.evidence
-    # Every coefficient of the fit at its column: those of the model, then what was told, a candidate here.
-    place = np.array([fit.names.index(name) for name in board.known], dtype=np.int64)
-    q = len(evidence.weight)
-    T, point = np.eye(q, len(place)), np.zeros(len(place))
-    D = differences(fit.names)
-    point[q:] = (D @ fit.estimate.values)[place[q:]]
-    for column in range(q, len(place)):
-        T[:, column] += drift_mean(evidence.candidate(column).effect, base.dwell_means, evidence.names[:q])
-    one = T @ (D @ fit.estimate.covariance @ D.T)[np.ix_(place, place)] @ T.T
+    columns = zip(window.told.members, board.columns(window.told.members), strict=True)
+    told = tuple(member for member, column in columns if column < len(board.known))
+    if set(board.known) != set(fit.names) or len(told) < len(board.known) - len(board.evidence.weight):
+        return fit
+    # Both in the linear model: that the scatter of power-ons is hardly known stays in the fit alone.
+    noise = board.noise_of(fit, window.told.noise)
+    one = Averages(board.as_stated, base.dwell_means).of_model(told, noise)
     all_ = Averages(board, base.dwell_means).of(window)
-    own = place[:q]
+    own = np.array([fit.names.index(name) for name in board.known[: len(board.evidence.weight)]], dtype=np.int64)
     values, covariance = fit.estimate.values.copy(), fit.estimate.covariance.copy()
-    values[own] += all_.mean - T @ point
-    covariance[np.ix_(own, own)] += none_below_zero(all_.covariance - one, np.sqrt(np.diag(one)))
+    values[own] += all_.mean - one.mean
+    covariance[np.ix_(own, own)] += none_below_zero(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))
     return replace(fit, estimate=replace(fit.estimate, values=values, covariance=covariance))

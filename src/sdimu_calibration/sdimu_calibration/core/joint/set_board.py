@@ -210,6 +210,21 @@ class SetBoard(Board[SetEvidence]):
         ranked = sorted(found.items(), key=lambda one: -one[1])
         return [(alone + gain, self._noise(chosen)) for chosen, gain in ranked if gain > ranked[0][1] - _NEAR]
 
+    def noise_of(self, fit: SetFit, likeliest: NoiseModel) -> NoiseModel:
+        """Find the noise in which a fit stands: of each recording the one with the terms that it has learned.
+
+        Parameters
+        ----------
+        likeliest : NoiseModel
+            Where a recording has learned terms that are not among its noises here, its noise in this one.
+        """
+        chosen = list(self._chosen(likeliest))
+        for k, report in enumerate(fit.reports):
+            wanted = {term.identity for term in report.noise}
+            same = (j for j, one in enumerate(self.rivals[k]) if {t.identity for t in one.noise.terms} == wanted)
+            chosen[k] = next(same, chosen[k])
+        return self._noise(tuple(chosen))
+
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
         own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=True))
         terms = tuple(t for noise in own for t in noise.terms)

@@ -10,6 +10,7 @@ import numpy as np
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.grades import size
+from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
@@ -72,7 +73,8 @@ class SetDiagnosis:
     them. By itself that model learns in each recording what it lacks as noise, and its own error hides it."""
     probabilities: Probabilities | None = None
     """Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
-    function of the attitude explains what is left, which the search did not know."""
+    function of the attitude explains what is left or an effect was taken back, which the search did not know, and where
+    the search did not come to an end."""
     unknown: tuple[UnknownFunction, ...] = ()
     """The function of the attitude that explains what is left, at all stops; empty without one."""
 
@@ -91,13 +93,14 @@ def diagnose_set(
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)
-    told = before if found.after is found.before else set_outcome(found.after)
-    after = averaged(told, found.after, found.posterior)
+    after = before if found.after is found.before else set_outcome(found.after)
+    after = averaged(after, found.after, found.posterior) if found.stood else after
     again = recurrence(leftovers(found.after, run))
-    facts = SetFacts(_findings(found), after, found.after, again, probabilities(found.posterior))
+    told = probabilities(found.posterior) if found.stood else None
+    facts = SetFacts(_findings(found), after, found.after, again, told)
     word = verdict(facts)
     refused: tuple[SetFinding, ...] = ()
-    why = ""
+    why = "" if found.stood else f"{TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}."
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
         refused = tuple(f for f in facts.findings if not f.recording)
@@ -269,6 +272,8 @@ def _advice(
             out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, _TELLS), Verb.CONTINUE))
         else:
             out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
+    if word == Verdict.CLASS_OF_EFFECTS and not findings:
+        out.append(Advice(Kind.RECORD_MORE))
     if word == Verdict.UNEXPLAINED:
         out.append(Advice(Kind.ONE_BY_ONE))
     return tuple(out)

@@ -89,6 +89,8 @@ class SetSearch:
     """What the set knows of the unit."""
     posterior: Posterior[SetEvidence]
     """The models that all recordings together leave probable."""
+    stood: bool = True
+    """The choice stood at the end; False where the search went to and fro: the window then is not about `after`."""
 
 
 def search_set(
@@ -121,6 +123,7 @@ def search_set(
     seen: set[frozenset[str]] = set()
     found: Search[SetEvidence] | None = None
     first: Search[SetEvidence] | None = None
+    stood = False
     for turn in range(_MOST_ROUNDS):
         progress("candidates", min(0.9, 0.4 + 0.1 * turn))
         full, evidence = _evidence(fit, extra, finer, run)
@@ -137,14 +140,15 @@ def search_set(
             finer = (*finer, *nearer)
             continue
         labels = frozenset(c.label for c in chosen)
-        if labels == {c.label for c in told} or labels in seen:
+        stood = labels == {c.label for c in told}
+        if stood or labels in seen:
             break
         seen.add(labels)
         told = chosen
         fit = fit_set(members, _with(options, told), run, fit, progress)
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
-    return _result(before, fit, told, evidence, (first, found))
+    return replace(_result(before, fit, told, evidence, (first, found)), stood=stood)
 
 
 def _result(

@@ -80,8 +80,8 @@ class SetFacts:
     again: Recurrence | None
     """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     told: Probabilities | None
-    """None where the search did not know of all that explains the set: a function of the attitude, or what was taken
-    back."""
+    """None where the search did not know of all that explains the set (a function of the attitude, what was taken
+    back), or did not come to an end."""
 
     @property
     def beside_function(self) -> bool:
@@ -112,8 +112,9 @@ def verdict(facts: SetFacts) -> Verdict:
         return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
     if findings:
         return Verdict.DATA_FAULT
-    likely = facts.told is not None and facts.told.nothing < PROBABLE
-    return Verdict.CLASS_OF_EFFECTS if likely else Verdict.CONSISTENT
+    if facts.told is None:
+        return Verdict.UNEXPLAINED
+    return Verdict.CLASS_OF_EFFECTS if facts.told.nothing < PROBABLE else Verdict.CONSISTENT
 
 
 def _scatter(result: Calibration) -> float:

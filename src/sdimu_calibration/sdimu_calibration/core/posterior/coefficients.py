@@ -101,13 +101,15 @@ class Averages:
         for place, (number, _) in enumerate(members, start=p):
             T[:, place] += self._shift(number)
         told = Moments(T @ estimate + constant, T @ covariance @ T.T + own)
-        for place, (number, _) in enumerate(members, start=p):
-            if not as_told and self._candidate(number).family == "own":
-                # What the coefficients are off by where the size of the equation is zero, all else as it is.
-                moved = T @ covariance[:, place] * estimate[place] / covariance[place, place]
-                seen = float(estimate[place] ** 2 / covariance[place, place])
-                told = _with_another_cause(told, moved, self._out_of_sight(number, seen, data.J))
-        return told
+        numbers = [number for number, _ in members]
+        at_own = [p + k for k, number in enumerate(numbers) if self._candidate(number).family == "own"]
+        if as_told or not at_own:
+            return told
+        # What the coefficients are off by where the sizes of all equations are zero, and all else stays.
+        moved = T @ covariance[:, at_own] @ np.linalg.solve(covariance[np.ix_(at_own, at_own)], estimate[at_own])
+        seen = estimate[at_own] ** 2 / np.diag(covariance)[at_own]
+        hidden = [self._out_of_sight(numbers[k - p], z2, data.J) for k, z2 in zip(at_own, seen.tolist(), strict=True)]
+        return _with_another_cause(told, moved, np.sum(hidden, axis=0))
 
     def _out_of_sight(self, number: int, seen: float, J: Floats) -> Floats:
         """Variance of what another cause in the place of an equation adds to the coefficients of its sensor.
@@ -148,9 +150,11 @@ class Averages:
     def _shift(self, number: int) -> Floats:
         """Mean over the dwells that a candidate adds to each of q coefficients, per unit; shape (q,)."""
         if number not in self._means:
-            evidence = self.board.evidence
+            evidence, candidate = self.board.evidence, self._candidate(number)
             names = evidence.names[: evidence.coefficients]
-            self._means[number] = drift_mean(self._candidate(number).effect, self._dwell_means, names)
+            # A drift of one recording of a set is none of the unit.
+            own = np.zeros(len(names)) if candidate.recording else None
+            self._means[number] = drift_mean(candidate.effect, self._dwell_means, names) if own is None else own
         return self._means[number]
 
     def _candidate(self, number: int) -> Candidate:
@@ -169,14 +173,14 @@ class Averages:
 
 
 def _with_another_cause(told: Moments, moved: Floats, hidden: Floats) -> Moments:
-    """Mix a model with an equation, and one in which another cause stands in the place of the equation.
+    """Mix a model with equations, and one in which other causes stand in the place of all of them.
 
     Parameters
     ----------
     moved : ndarray, shape (q,)
-        What the equation adds to each coefficient (SI).
+        What the equations add to each coefficient (SI).
     hidden : ndarray, shape (q,)
-        Variance of what the other cause adds (SI squared).
+        Variance of what the other causes add (SI squared).
     """
     p = _IS_THE_CAUSE
     spread = p * (1.0 - p) * np.outer(moved, moved) + (1.0 - p) * np.diag(hidden)

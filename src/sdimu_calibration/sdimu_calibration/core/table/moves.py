@@ -33,6 +33,7 @@ class Step:
     turn: Turn | None
     """Its axis is a platform axis (``X``, ``Y``, ``Z``) or the name of a joint; None only dwells."""
     dwell_s: float
+    """Rest after the turn (s)."""
     acceleration_rad_s2: float | None = None
     """Largest acceleration of the turn (rad/s^2); the limit of the axis when None."""
 

@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.found import looked_at
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.summary import summarise
+from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
@@ -95,7 +95,7 @@ class Missing:
     unknown: tuple[UnknownFunction, ...] = ()
     """Errors that no effect explains, by what they follow."""
     mended: bool = False
-    """Effects were found, and the model with them explains the recording."""
+    """Something is missing, and effects explain the recording: those that were found, or some of a class."""
     worst: Off | None = None
     """The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
     """
@@ -156,7 +156,7 @@ class FitSession:
                     scores.fit.held_out_rms(),
                     told.probabilities,
                     unknown_of(told),
-                    bool(summary.candidates) and told.verdict != Verdict.DATA_FAULT,
+                    _mended(summary),
                     off[0] if off else None,
                 )
                 _keep(self._missing, setting, found)
@@ -269,3 +269,8 @@ def _keep(kept: dict[Setting, Any], setting: Setting, value: Any) -> None:
     while len(kept) >= _MOST_KEPT:
         kept.pop(next(iter(kept)))
     kept[setting] = value
+
+
+def _mended(summary: DiagnosisSummary) -> bool:
+    word = summary.diagnosis.verdict
+    return word == Verdict.CLASS_OF_EFFECTS or (bool(summary.candidates) and word != Verdict.DATA_FAULT)

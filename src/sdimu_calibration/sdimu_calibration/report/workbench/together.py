@@ -60,7 +60,8 @@ def shown(found: SetDiagnosis) -> list[Any]:
         for f in found.findings
     ]
     heads = ("effect", "in", "size", "score", "looks the same")
-    tone = "good" if found.verdict == Verdict.CONSISTENT else "bad"
+    bad = {Verdict.UNEXPLAINED, Verdict.DATA_FAULT}
+    tone = "good" if found.verdict == Verdict.CONSISTENT else "bad" if found.verdict in bad else "doubtful"
     return [
         html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"),
         *([table(heads, rows)] if rows else []),

@@ -88,6 +88,10 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "outliers when the tails are heavy."
     ),
     Kind.UNKNOWN_CAUSE: _unknown,
+    Kind.RECORD_MORE: lambda: (
+        "One recording more lets one of the effects stand out, or all fall: record the unit again, and diagnose all "
+        "recordings together (sdimu diagnose FIRST SECOND)."
+    ),
     Kind.RUN_BACKWARDS: lambda: (
         "Run the plan again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
         "that says whether it comes back at the same attitude, time or temperature, or is of this run. The other order"

@@ -82,6 +82,10 @@ def _or(default: Any, value: Any) -> Any:
 def _figure(value: Any) -> int | float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("a number is expected")
+    try:
+        float(value)
+    except OverflowError as error:
+        raise ValueError("a number is expected that 64 bits can hold") from error
     return value
 
 
