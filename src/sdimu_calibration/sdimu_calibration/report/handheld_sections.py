@@ -61,7 +61,11 @@ def _ladder(summary: DiagnosisSummary) -> str:
         *tried,
         quiet("Steps are in sigmas of the fit on which they were tried; the missing effect makes these larger.")
         if tried
-        else sentence("No candidate exceeds the scatter: the model stays as it is."),
+        else sentence(
+            "No candidate exceeds the scatter: the model stays as it is."
+            if d.adequate
+            else "Nothing was added to this model: no effect by itself is likely enough."
+        ),
     )
 
 
