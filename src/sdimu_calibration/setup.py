@@ -42,7 +42,7 @@ EXTRAS = {
     "workbench": ["dash"],
     "notebook": ["pandas", "plotly"],
     "pictures": ["matplotlib"],
-    "matlab": ["mat-io"],
+    "matlab": ["h5py", "mat-io"],
     "study": ["dask", "distributed", "matplotlib"],
     "test": [
         "AllanTools",

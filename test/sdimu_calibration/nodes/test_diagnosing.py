@@ -11,9 +11,10 @@ def test_the_death_of_the_worker_is_told_once(monkeypatch):
         raise DataError("the process has ended")
 
     worker = SimpleNamespace(answer=answer, close=lambda: None)
-    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.Worker", lambda _: worker)
+    monkeypatch.setattr("sdimu_calibration.nodes.diagnosing.Worker", lambda *_: worker)
     told = []
-    node = SimpleNamespace(create_publisher=lambda *_: None)
+    logger = SimpleNamespace(warning=None)
+    node = SimpleNamespace(create_publisher=lambda *_: None, get_logger=lambda: logger)
     diagnosing = Diagnosing(node, SimpleNamespace(report=None), (), told.append)
     diagnosing.tick(1)
     diagnosing.tick(2)

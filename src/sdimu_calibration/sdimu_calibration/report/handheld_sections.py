@@ -11,6 +11,7 @@ from sdimu_calibration.core.diagnosis.verdict import shown
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, places
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence, switched
 from sdimu_calibration.report.sections import STEP_COLUMNS, found_table, step_row
@@ -62,9 +63,9 @@ def _ladder(summary: DiagnosisSummary) -> str:
         quiet("Steps are in sigmas of the fit on which they were tried; the missing effect makes these larger.")
         if tried
         else sentence(
-            "No candidate exceeds the scatter: the model stays as it is."
-            if d.adequate
-            else "Nothing was added to this model: no effect by itself is likely enough."
+            "Nothing was added to this model: no effect by itself is likely enough."
+            if d.verdict == Verdict.CLASS_OF_EFFECTS
+            else "No candidate exceeds the scatter: the model stays as it is."
         ),
     )
 

@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
 from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip, title_of
@@ -87,7 +88,7 @@ def _no_step(diagnosis: Diagnosis) -> str:
     standing = int(np.sum(np.abs(diagnosis.found.first.z) > diagnosis.found.threshold))
     if standing and not diagnosis.adequate:
         return f"Nothing was added to this model; {standing} of the candidates below stand out of the noise."
-    if not diagnosis.adequate:
+    if diagnosis.verdict == Verdict.CLASS_OF_EFFECTS:
         return "Nothing was added to this model: no effect by itself is likely enough."
     return "No candidate stands out of the noise: the model stays as it is."
 

@@ -123,7 +123,7 @@ def test_members_of_one_recording_and_very_many_of_them_are_said_in_words():
     one = MemberShare("gyro_bias_x@r2", 0.2, 1.0, 0.1, "rad/s", "deg/h")
     # Of the family .45, most in members that are no more likely than one in a hundred.
     family = FamilyShare("gyro_bias", "gyro_x", 0.45, (one,))
-    assert something_missing(Probabilities(0.3, (family,), ())).endswith(": gyro_bias_x in r2 alone 20 %.")
+    assert something_missing(Probabilities(0.3, (family,), ())).endswith(": gyro_bias_x in r2 20 %.")
     none = replace(family, members=())
     assert something_missing(Probabilities(0.3, (none,), ())) == (
         "Something is missing (70 %), but none of very many effects by itself is likely."

@@ -11,12 +11,13 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
-from sdimu_calibration.core.posterior.coefficients import Averages
+from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.recording import DataError
@@ -88,6 +89,13 @@ def test_the_told_model_has_the_sigmas_of_its_fit(both):
     at = [both.after.names.index(name) for name in names]
     fitted = np.sqrt(np.diag(both.after.estimate.covariance)[at])
     ratio = np.sqrt(np.diag(told_alone(both).covariance)) / fitted
+    # The model is linear about the fit: nothing moves, but the bias in whose mean a ramp of all recordings stands.
+    moved = told_alone(both).mean / fitted
+    still = np.array(names) != "gyro_bias_x"
+    np.testing.assert_allclose(moved[still], 0.0, atol=0.05)
+    ramp = drift_mean(resolve("gyro_bias_ramp_x"), both.after.base.dwell_means, names) / fitted
+    size = both.after.estimate.values[both.after.names.index("gyro_bias_ramp_x")]
+    np.testing.assert_allclose(moved, size * ramp, atol=0.05)
     scatters = np.isin(names, both.after.varying_names)
     assert scatters.sum() == 6
     np.testing.assert_allclose(ratio[~scatters], 1.0, atol=0.01)
@@ -111,7 +119,8 @@ def test_what_the_window_adds_is_the_difference_of_its_moments_to_those_of_the_t
     all_, one = Averages(window.board, fit.base.dwell_means).of(window), told_alone(both)
     at = [fit.names.index(name) for name in window.board.known[: len(one.mean)]]
     sigma = np.sqrt(np.diag(one.covariance))
-    np.testing.assert_allclose((mean.estimate.values - fit.estimate.values)[at] / sigma, (all_.mean - one.mean) / sigma)
+    moved = (mean.estimate.values - fit.estimate.values)[at] / sigma
+    np.testing.assert_allclose(moved, (all_.mean - one.mean) / sigma, atol=1e-6)
     added = (np.diag(mean.estimate.covariance) - np.diag(fit.estimate.covariance))[at] / sigma**2
     wider = (np.diag(all_.covariance) - np.diag(one.covariance)) / sigma**2
     # What a direction is known better in is not taken off; so it may be more, and is not much more.

@@ -113,8 +113,8 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
 def _about_many(d: Diagnosis) -> list[Advice]:
     """Advise where something is missing, and no effect by itself is likely."""
     families = d.probabilities.families if d.probabilities is not None else ()
-    labels = [family.members[0].label for family in families if family.members]
-    names = tuple(label for label in labels if _in_catalogue(label))[:2]
+    members = sorted((one for family in families for one in family.members), key=lambda one: -one.probability)
+    names = tuple(one.label for one in members if _in_catalogue(one.label))[:2]
     turns = [Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)] if len(names) > 1 else []
     return [Advice(Kind.RECORD_MORE), *turns]
 

@@ -121,7 +121,7 @@ def something_missing(told: Probabilities) -> str:
 def _of_recording(label: str) -> str:
     """Write a label, that of one recording with its name in words."""
     key, _, recording = label.partition(OF_RECORDING)
-    return f"{key} in {recording} alone" if recording else key
+    return f"{key} in {recording}" if recording else key
 
 
 def _consistent(d: Diagnosis) -> str:

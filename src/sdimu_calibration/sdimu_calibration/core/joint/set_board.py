@@ -211,7 +211,7 @@ class SetBoard(Board[SetEvidence]):
         return [(alone + gain, self._noise(chosen)) for chosen, gain in ranked if gain > ranked[0][1] - _NEAR]
 
     def noise_of(self, fit: SetFit, likeliest: NoiseModel) -> NoiseModel:
-        """Find the noise in which a fit stands: of each recording the one with the terms that it has learned.
+        """Find the noise in which a fit stands: of each recording that with the terms it has learned, near in size.
 
         Parameters
         ----------
@@ -220,9 +220,10 @@ class SetBoard(Board[SetEvidence]):
         """
         chosen = list(self._chosen(likeliest))
         for k, report in enumerate(fit.reports):
-            wanted = {term.identity for term in report.noise}
-            same = (j for j, one in enumerate(self.rivals[k]) if {t.identity for t in one.noise.terms} == wanted)
-            chosen[k] = next(same, chosen[k])
+            wanted = {term.identity: np.log(term.size) for term in report.noise}
+            every = [{t.identity: np.log(t.size) for t in one.noise.terms} for one in self.rivals[k]]
+            same = [j for j, one in enumerate(every) if one.keys() == wanted.keys()]
+            chosen[k] = min(same, key=lambda j: sum(abs(every[j][i] - wanted[i]) for i in wanted), default=chosen[k])
         return self._noise(tuple(chosen))
 
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:

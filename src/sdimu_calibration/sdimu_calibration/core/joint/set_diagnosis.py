@@ -104,7 +104,7 @@ def diagnose_set(
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
         # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
         refused = tuple(f for f in facts.findings if not f.recording)
-        why = _fits_worse(refused, before, after)
+        why = f"{_fits_worse(refused, before, after)} {why}".strip()
         found = taken_back(found, options, run, [f.label for f in refused])
         after = set_outcome(found.after) if found.local else before
         again = recurrence(leftovers(found.after, run))

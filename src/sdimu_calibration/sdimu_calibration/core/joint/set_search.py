@@ -90,7 +90,7 @@ class SetSearch:
     posterior: Posterior[SetEvidence]
     """The models that all recordings together leave probable."""
     stood: bool = True
-    """The choice stood at the end; False where the search went to and fro: the window then is not about `after`."""
+    """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
 
 
 def search_set(
@@ -120,7 +120,7 @@ def search_set(
     before = fit = fitted or fit_set(members, options, run, progress=progress)
     told: tuple[Candidate, ...] = ()
     finer: tuple[Effect, ...] = ()
-    seen: set[frozenset[str]] = set()
+    seen: set[frozenset[str]] = {frozenset()}
     found: Search[SetEvidence] | None = None
     first: Search[SetEvidence] | None = None
     stood = False
@@ -148,7 +148,7 @@ def search_set(
         fit = fit_set(members, _with(options, told), run, fit, progress)
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
-    return replace(_result(before, fit, told, evidence, (first, found)), stood=stood)
+    return _result(before, fit, told, evidence, (first, found), stood)
 
 
 def _result(
@@ -157,6 +157,7 @@ def _result(
     told: Sequence[Candidate],
     evidence: SetEvidence,
     searches: tuple[Search[SetEvidence], Search[SetEvidence]],
+    stood: bool,
 ) -> SetSearch:
     """Put the result together of the fit with what is told, and of the first and the last search."""
     first, last = searches
@@ -164,7 +165,8 @@ def _result(
     if window is None:
         raise AssertionError("a search weighs models")
     z = {step.label: step.z for step in last.steps}
-    classes = {c.label: _class(window, c.label) for c in told}
+    # A window that chooses something else does not say how probable this is.
+    classes = {c.label: _class(window, c.label) if stood else ((), float("nan"), ()) for c in told}
     shared = {c.label: c for c in told if not c.recording}
     alike = {label: classes[label][0] for label in shared}
     local = tuple(
@@ -185,6 +187,7 @@ def _result(
         first,
         set_standing(fit, evidence if shared else set_evidence(fit, ()), shared, alike),
         window,
+        stood,
     )
 
 

@@ -107,19 +107,26 @@ class Averages:
             return told
         # What the coefficients are off by where the sizes of all equations are zero, and all else stays.
         moved = T @ covariance[:, at_own] @ np.linalg.solve(covariance[np.ix_(at_own, at_own)], estimate[at_own])
-        seen = estimate[at_own] ** 2 / np.diag(covariance)[at_own]
-        hidden = [self._out_of_sight(numbers[k - p], z2, data.J) for k, z2 in zip(at_own, seen.tolist(), strict=True)]
-        return _with_another_cause(told, moved, np.sum(hidden, axis=0))
+        hidden = np.zeros(q)
+        for channel in sorted({self._channel(numbers[k - p]) for k in at_own}):
+            of_sensor = [k for k in at_own if self._channel(numbers[k - p]) == channel]
+            inside = np.linalg.solve(covariance[np.ix_(of_sensor, of_sensor)], estimate[of_sensor])
+            hidden += self._out_of_sight(channel, float(estimate[of_sensor] @ inside), data.J)
+        return _with_another_cause(told, moved, hidden)
 
-    def _out_of_sight(self, number: int, seen: float, J: Floats) -> Floats:
-        """Variance of what another cause in the place of an equation adds to the coefficients of its sensor.
+    def _channel(self, number: int) -> int:
+        """Sensor axis of a candidate, 0 to 5."""
+        return self._candidate(number).effect.terms[0].channel
+
+    def _out_of_sight(self, channel: int, seen: float, J: Floats) -> Floats:
+        """Variance of what another cause in the place of equations of a sensor adds to its coefficients.
 
         As much as is seen of it, in equal parts.
 
         Parameters
         ----------
         seen : float
-            Squared significance of the equation (1).
+            Squared significance of these equations together (1).
         J : ndarray, shape (k, k)
             Information of each column alone, those of the q coefficients first (1/SI^2).
 
@@ -129,7 +136,6 @@ class Averages:
             SI squared; zero for the coefficients of other sensors.
         """
         names = self.board.evidence.names[: self.board.evidence.coefficients]
-        channel = self._candidate(number).effect.terms[0].channel
         at = [k for k, name in enumerate(names) if channel_of(name) == channel and J[k, k] > 0.0]
         out = np.zeros(len(names))
         out[at] = seen / len(at) / np.diag(J)[at] if at else 0.0
