@@ -20,7 +20,20 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("rate_table_sim", "sdimu_calibration", "sdimu_sim")
 STUDY = "sdimu_study"
 SOURCES = {name: Path("src") / name for name in PACKAGES} | {STUDY: Path("study")}
-OPTIONAL = {"tf2_msgs", "dash", "flask", "werkzeug", "plotly", "pandas", "matplotlib", "PIL", "dask", "distributed"}
+OPTIONAL = {
+    "matio",
+    "h5py",
+    "tf2_msgs",
+    "dash",
+    "flask",
+    "werkzeug",
+    "plotly",
+    "pandas",
+    "matplotlib",
+    "PIL",
+    "dask",
+    "distributed",
+}
 """Imported where it is installed; nodes/transform_type stands in for the first, extras and `sdimu_study` bring the
 others, and whoever lacks them is told so."""
 
