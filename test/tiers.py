@@ -212,6 +212,7 @@ LONG = {
     ),
     "test/sdimu_calibration/core/posterior/test_coefficients.py": (
         "test_half_of_an_equation_that_no_physics_names_moves_no_coefficient",
+        "test_several_equations_of_a_sensor_are_the_cause_together_or_none_is",
     ),
     "test/sdimu_calibration/core/noise/test_quantisation.py": (
         "test_what_a_counter_hides_is_found",

@@ -108,14 +108,14 @@ def test_over_the_told_model_alone_coefficients_are_those_of_its_fit(both):
     noise = window.board.noise_of(fit, window.told.noise)
     told = replace(window.models[0], members=window.told.members, noise=noise, probability=1.0)
     alone = SimpleNamespace(board=window.board.as_stated, models=(told,), told=window.told)
-    one = over_all_models(fit, alone, fit.base)
+    one = over_all_models(fit, alone)
     np.testing.assert_array_equal(one.estimate.values, fit.estimate.values)
     np.testing.assert_array_equal(one.estimate.covariance, fit.estimate.covariance)
 
 
 def test_what_the_window_adds_is_the_difference_of_its_moments_to_those_of_the_told_model(both):
     window, fit = both.posterior, both.after
-    mean = over_all_models(fit, window, fit.base)
+    mean = over_all_models(fit, window)
     all_, one = Averages(window.board, fit.base.dwell_means).of(window), told_alone(both)
     at = [fit.names.index(name) for name in window.board.known[: len(one.mean)]]
     sigma = np.sqrt(np.diag(one.covariance))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.posterior.coefficients import Averages
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
 
 
 def test_moments_over_all_models_are_those_of_the_mixture(bench):
@@ -59,3 +60,40 @@ def test_half_of_an_equation_that_no_physics_names_moves_no_coefficient(bench):
     z = diagnosis.found.steps[0].z
     assert signal[of_sensor].sum() == pytest.approx(z**2, rel=0.05)
     np.testing.assert_allclose(signal[of_sensor], signal[of_sensor].mean(), rtol=1e-6)
+
+
+def test_several_equations_of_a_sensor_are_the_cause_together_or_none_is(bench):
+    diagnosis = bench.diagnosis(effects=("accel_z=15*ug*sin(2*pi*t/500 + 0.7)",))
+    found = diagnosis.found.posterior
+    board, noise = found.board, NoiseModel()
+    averages, p = Averages(board, diagnosis.fit.dwell_means), len(board.evidence.weight)
+    every = {k: found.candidate(k) for k in range(len(board.use))}
+    first = next(k for model in found.models for k, _ in model.members)
+    of_sensor = [k for k, one in every.items() if one.family == "own" and one.effect.terms == every[first].effect.terms]
+    J = board.in_noise(noise).J
+    # Columns that say nearly the same: the sum of what each tells is far from what both do.
+    alike = np.array([J[p + first, p + k] / np.sqrt(J[p + first, p + first] * J[p + k, p + k]) for k in of_sensor])
+    near = of_sensor[int(np.argmin(np.abs(np.abs(alike) - 0.9)))]
+    members = ((first, 2), (near, 2))
+    half, told, without = (
+        averages.of_model(members, noise, as_told=False),
+        averages.of_model(members, noise),
+        averages.of_model((), noise),
+    )
+    scale = np.sqrt(np.diag(told.covariance))
+    scale[scale == 0.0] = 1.0
+    np.testing.assert_allclose((half.mean - 0.5 * (told.mean + without.mean)) / scale, 0.0, atol=1e-6)
+    moved = told.mean - without.mean
+    hidden = np.diag(half.covariance - told.covariance) - 0.25 * moved**2
+    signal = 2.0 * hidden * np.diag(J)[: len(scale)]
+    assert signal.sum() == pytest.approx(explained(board, members) - explained(board, ()), rel=1e-4)
+
+
+def explained(board, members):
+    """Sum of squares that coefficients and members take up, those of the priors included."""
+    data, p = board.in_noise(NoiseModel()), len(board.evidence.weight)
+    at = [*range(p), *(p + k for k, _ in members)]
+    A = data.J[np.ix_(at, at)] + np.diag(board.parameters(members)[1])
+    scale = 1.0 / np.sqrt(np.diag(A))
+    d = data.d[at] * scale
+    return float(d @ np.linalg.solve(A * np.outer(scale, scale), d))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.averaged import none_below_zero
-from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
@@ -15,15 +14,15 @@ from sdimu_calibration.core.posterior.coefficients import Averages
 from sdimu_calibration.core.posterior.posterior import Posterior
 
 
-def over_all_models(fit: SetFit, window: Posterior[SetEvidence], base: Fit) -> SetFit:
+def over_all_models(fit: SetFit, window: Posterior[SetEvidence]) -> SetFit:
     """Return a fit with what was found, its coefficients and their covariance those of all probable models.
+
+    A bias is that in the mean over the dwells of the recording in whose frame the result stands.
 
     Parameters
     ----------
     fit : SetFit
         With what was found; the window is linear about it. A fit of another model is returned as it is.
-    base : Fit
-        Of the recording in whose frame the result stands: a bias is that in the mean over its dwells.
     """
     board = window.board
     if not isinstance(board, SetBoard):
@@ -34,8 +33,9 @@ def over_all_models(fit: SetFit, window: Posterior[SetEvidence], base: Fit) -> S
         return fit
     # Both in the linear model: that the scatter of power-ons is hardly known stays in the fit alone.
     noise = board.noise_of(fit, window.told.noise)
-    one = Averages(board.as_stated, base.dwell_means).of_model(told, noise)
-    all_ = Averages(board, base.dwell_means).of(window)
+    means = fit.base.dwell_means
+    one = Averages(board.as_stated, means).of_model(told, noise)
+    all_ = Averages(board, means).of(window)
     own = np.array([fit.names.index(name) for name in board.known[: len(board.evidence.weight)]], dtype=np.int64)
     values, covariance = fit.estimate.values.copy(), fit.estimate.covariance.copy()
     values[own] += all_.mean - one.mean

@@ -108,6 +108,7 @@ def diagnose_set(
         found = taken_back(found, options, run, [f.label for f in refused])
         after = set_outcome(found.after) if found.local else before
         again = recurrence(leftovers(found.after, run))
+        # What was found is taken back, and something is missing all the same: the verdict stays.
         facts = SetFacts(_findings(found), after, found.after, again, None)
     asked = again is not None and (not again.answer or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)

@@ -52,7 +52,7 @@ def averaged(result: Calibration, fit: SetFit, window: Posterior[SetEvidence]) -
     window : Posterior
         Of the models that the recordings leave probable, linear about the fit.
     """
-    mean = over_all_models(fit, window, fit.base)
+    mean = over_all_models(fit, window)
     return doubted(result, *_reported(mean, fit.base, mean.estimate.covariance))
 
 

@@ -89,7 +89,7 @@ class SetSearch:
     """What the set knows of the unit."""
     posterior: Posterior[SetEvidence]
     """The models that all recordings together leave probable."""
-    stood: bool = True
+    stood: bool
     """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
 
 

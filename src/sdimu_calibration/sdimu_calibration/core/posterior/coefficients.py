@@ -3,7 +3,8 @@
     mean = sum_m w_m theta_m,   C = sum_m w_m (C_m + (theta_m - mean)(theta_m - mean)')
 
 Each coefficient means the same in all models: a bias is that in the mean over the dwells, with whatever drifts or
-wanders there. Source: J. Hoeting et al., "Bayesian model averaging: a tutorial", Statistical Science 14 (1999).
+wanders there; a drift of one recording of a set alone is none of the unit. Source: J. Hoeting et al., "Bayesian model
+averaging: a tutorial", Statistical Science 14 (1999).
 
 An equation that no physics names shows what residuals look like, and not what its cause adds to the coefficients: with
 one probability it moves them as the equation does. With the other it does not, and another cause adds as much to the
@@ -33,7 +34,6 @@ from sdimu_calibration.core.recording import DataError
 
 _MOST = 400
 """Number of models that are averaged at most, the likeliest first: those behind weigh less than a thousandth each."""
-
 _IS_THE_CAUSE = 0.5
 """Probability (1) that an equation that no physics names moves the coefficients as its cause does: nothing in the data
 says so, nothing speaks against it."""
@@ -101,22 +101,21 @@ class Averages:
         for place, (number, _) in enumerate(members, start=p):
             T[:, place] += self._shift(number)
         told = Moments(T @ estimate + constant, T @ covariance @ T.T + own)
-        numbers = [number for number, _ in members]
-        at_own = [p + k for k, number in enumerate(numbers) if self._candidate(number).family == "own"]
-        if as_told or not at_own:
+        equations = {
+            place: one.effect.terms[0].channel
+            for place, one in enumerate((self._candidate(number) for number, _ in members), start=p)
+            if one.family == "own"
+        }
+        if as_told or not equations:
             return told
         # What the coefficients are off by where the sizes of all equations are zero, and all else stays.
-        moved = T @ covariance[:, at_own] @ np.linalg.solve(covariance[np.ix_(at_own, at_own)], estimate[at_own])
+        moved = T @ covariance[:, list(equations)] @ _inverse_times(list(equations), covariance, estimate)
         hidden = np.zeros(q)
-        for channel in sorted({self._channel(numbers[k - p]) for k in at_own}):
-            of_sensor = [k for k in at_own if self._channel(numbers[k - p]) == channel]
-            inside = np.linalg.solve(covariance[np.ix_(of_sensor, of_sensor)], estimate[of_sensor])
-            hidden += self._out_of_sight(channel, float(estimate[of_sensor] @ inside), data.J)
+        for channel in sorted(set(equations.values())):
+            of_sensor = [place for place, other in equations.items() if other == channel]
+            seen = float(estimate[of_sensor] @ _inverse_times(of_sensor, covariance, estimate))
+            hidden += self._out_of_sight(channel, seen, data.J)
         return _with_another_cause(told, moved, hidden)
-
-    def _channel(self, number: int) -> int:
-        """Sensor axis of a candidate, 0 to 5."""
-        return self._candidate(number).effect.terms[0].channel
 
     def _out_of_sight(self, channel: int, seen: float, J: Floats) -> Floats:
         """Variance of what another cause in the place of equations of a sensor adds to its coefficients.
@@ -158,9 +157,9 @@ class Averages:
         if number not in self._means:
             evidence, candidate = self.board.evidence, self._candidate(number)
             names = evidence.names[: evidence.coefficients]
+            mean = drift_mean(candidate.effect, self._dwell_means, names)
             # A drift of one recording of a set is none of the unit.
-            own = np.zeros(len(names)) if candidate.recording else None
-            self._means[number] = drift_mean(candidate.effect, self._dwell_means, names) if own is None else own
+            self._means[number] = np.zeros_like(mean) if candidate.recording else mean
         return self._means[number]
 
     def _candidate(self, number: int) -> Candidate:
@@ -176,6 +175,11 @@ class Averages:
                 G = np.einsum("s,scr->cr", cut.in_dwells, one.R.reshape(cut.cells, 6, -1))
                 self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
         return self._noises[noise]
+
+
+def _inverse_times(at: Sequence[int], covariance: Floats, estimate: Floats) -> Floats:
+    """Inverse of the covariance of some parameters times their estimates, per SI unit of each, shape (k,)."""
+    return np.asarray(np.linalg.solve(covariance[np.ix_(at, at)], estimate[list(at)]))
 
 
 def _with_another_cause(told: Moments, moved: Floats, hidden: Floats) -> Moments:
