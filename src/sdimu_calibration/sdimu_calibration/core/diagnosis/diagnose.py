@@ -253,7 +253,7 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     """
     first = done.found.first
     largest = float(np.max(np.abs(first.z), initial=0.0))
-    count = int(np.isfinite(first.sigma).sum())
+    count = int(np.isfinite(first.sigma).sum()) + done.found.passed
     of_scan = min(1.0, count * 2.0 * normal_tail(largest))
     if not len(done.free):
         return float(of_scan)

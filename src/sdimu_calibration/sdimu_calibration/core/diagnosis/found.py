@@ -100,7 +100,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
         scanned = problem.scan(chosen[:k])
         scores = problem.scores(scanned)
         z = float(scanned.z[column])
-        count = int(np.isfinite(scanned.sigma[allowed]).sum())
+        count = int(np.isfinite(scanned.sigma[allowed]).sum()) + d.found.passed
         probability, shares = d.may_be(column)
         out.append(
             Found(

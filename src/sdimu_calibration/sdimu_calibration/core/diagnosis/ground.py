@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, equations, free_inputs, periodic
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
@@ -16,6 +16,7 @@ from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.posterior.near import near
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Option
@@ -55,6 +56,8 @@ class Ground:
     """`tried` is among its candidates."""
     free: Ints
     """Columns of the free inputs in `evidence`, shape (f,)."""
+    passed: int = 0
+    """Number of equations that were looked at and are no candidates, as they are far from every model."""
 
     @property
     def allowed(self) -> Ints:
@@ -97,11 +100,13 @@ def next_ground(
     if request.base.learns_scatter:
         return fresh_ground(request, fit, tried, own)
     before = found.evidence if found.white is None else found.white
-    evidence = before.about(request.in_inner(fit.bare), fit.added_columns(len(tried)), tried)
-    if own and not any(c.family == "own" for c in evidence.candidates):
+    evidence, passed = before.about(request.in_inner(fit.bare), fit.added_columns(len(tried)), tried), found.passed
+    if own and found.posterior and not any(c.family == "own" for c in evidence.candidates):
         more = _untried(candidates(request, (), own), frozenset(evidence.names))
-        evidence = _without_doubles(evidence, more)
-    return Ground(fit, tuple(tried), evidence, free)
+        kept, signature = near(found.posterior, more)
+        passed = sum(len(e.parameters) for e in more) - len(kept)
+        evidence = _without_doubles(evidence, kept, signature)
+    return Ground(fit, tuple(tried), evidence, free, passed)
 
 
 def extended(request: Request, chosen: Sequence[Candidate], progress: Progress) -> Fit:
@@ -135,10 +140,10 @@ def candidates(request: Request, tried: Sequence[Candidate], own: bool) -> list[
     return _untried(known, {c.label for c in tried} | base.labels)
 
 
-def _without_doubles(evidence: LinearEvidence, equations: Sequence[Effect]) -> LinearEvidence:
+def _without_doubles(evidence: LinearEvidence, equations: Sequence[Effect], signature: Floats) -> LinearEvidence:
     """Add equations, but those that a registered effect already is: the catalogue has the word."""
     n, p = len(evidence.names), len(evidence.weight)
-    wider = evidence.with_effects(equations)
+    wider = evidence.with_effects(equations, signature)
     size = np.sqrt(np.maximum(np.diag(wider.information.J), 1e-300))
     alike = np.abs(wider.information.J[n:, p:n]) / np.outer(size[n:], size[p:n])
     single = np.flatnonzero(alike.max(axis=1, initial=0.0) < 1.0 - _PARALLEL) + n

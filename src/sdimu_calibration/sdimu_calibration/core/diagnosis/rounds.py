@@ -181,14 +181,15 @@ def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, fl
         ground.evidence,
         ground.allowed,
         Wander.of(ground.evidence) if request.wander is None else request.wander,
-        request.alpha,
+        # Noise may put an equation that is passed over above the threshold, too.
+        request.alpha * len(ground.allowed) / (len(ground.allowed) + ground.passed),
         limits.get(own),
         # A fit that learns its scatter has signatures of its own each time.
         None if learns or earlier is None else earlier.found,
         tell_noise=not learns,
     )
     limits.setdefault(own, found.threshold)
-    return _round(ground, found)
+    return _round(ground, replace(found, passed=ground.passed))
 
 
 def _round(ground: Ground, found: Search[LinearEvidence]) -> Round:

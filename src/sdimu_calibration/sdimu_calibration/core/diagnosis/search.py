@@ -55,6 +55,8 @@ class Search(Generic[E]):
     """The choice stood at the end; False where the search went to and fro and the last choice was taken."""
     posterior: Posterior[E] | None = None
     """The models that the data leave probable; None where none was worked out."""
+    passed: int = 0
+    """Number of equations that were looked at before the search, and are far from every model."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -180,6 +181,8 @@ class Effect:
     def only(self, names: tuple[str, ...]) -> Effect:
         """Return the effect with the named parameters alone."""
         kept = [i for i, p in enumerate(self.parameters) if p.name in names]
+        if self.family and len(kept) == len(self.parameters):
+            return self
         columns = [c for c, term in enumerate(self.terms) if term.parameter in kept]
         whole = self.regressors
         label = self.name if len(kept) == len(self.parameters) else "+".join(names) + self.variant
@@ -191,6 +194,11 @@ class Effect:
             terms=tuple(Term(self.terms[c].channel, kept.index(self.terms[c].parameter)) for c in columns),
             regressors=whole.only(columns) if isinstance(whole, _Columns) else lambda motion: whole(motion)[:, columns],
         )
+
+    @cached_property
+    def singles(self) -> tuple[Effect, ...]:
+        """Each parameter as an effect of its own."""
+        return tuple(self.only((p.name,)) for p in self.parameters)
 
     @property
     def sheet_term(self) -> str:

@@ -58,12 +58,8 @@ class Candidate:
 
 def split(effect: Effect) -> list[Candidate]:
     """One candidate for each parameter of an effect."""
-    out = []
-    for parameter, label in zip(effect.parameters, effect.labels, strict=True):
-        one = effect.only((parameter.name,))
-        family = "own" if effect.title == OWN else effect.family or effect.name
-        out.append(Candidate(one, family, label))
-    return out
+    family = "own" if effect.title == OWN else effect.family or effect.name
+    return [Candidate(one, family, label) for one, label in zip(effect.singles, effect.labels, strict=True)]
 
 
 def of_the_sensor(variant: Effect, name: str) -> str:

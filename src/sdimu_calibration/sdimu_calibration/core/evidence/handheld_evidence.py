@@ -155,7 +155,7 @@ def standardised(evidence: HandheldEvidence, chosen: Ints) -> Floats:
     weight = np.concatenate([evidence.weight, np.zeros(len(chosen))])
     estimate, covariance = evidence.information.estimate(known, weight)
     W = evidence.W[:, known]
-    free = 1.0 - np.einsum("ij,jk,ik->i", W, covariance, W)
+    free = 1.0 - np.einsum("ij,jk,ik->i", W, covariance, W, optimize=True)
     left = evidence.e - W @ estimate
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(free > _REDUNDANT, left / np.sqrt(free), np.nan)

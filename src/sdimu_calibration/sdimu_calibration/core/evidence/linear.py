@@ -185,10 +185,16 @@ class LinearEvidence(ABC):
         """
         return replace(self, noise=modes, worked_out=worked_out) if modes.size or self.noise.size else self
 
-    def with_effects(self: E, effects: Sequence[Effect]) -> E:
-        """Return the evidence with the parameters of more effects behind the candidates it has."""
+    def with_effects(self: E, effects: Sequence[Effect], signature: Floats | None = None) -> E:
+        """Return the evidence with the parameters of more effects behind the candidates it has.
+
+        Parameters
+        ----------
+        signature : ndarray, shape (N, parameters), optional
+            Of these effects, where it is known (whitened residual per SI unit).
+        """
         more, prior = candidate_priors(effects, self.imu)
-        W = self.signature(effects)
+        W = self.signature(effects) if signature is None else signature
         # Only what is new is multiplied: the old columns are many.
         weighed, every, old = self.weighed(W), np.hstack([self.W, W]), self.information
         q = len(old.d)

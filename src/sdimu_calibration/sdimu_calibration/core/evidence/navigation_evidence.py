@@ -43,8 +43,9 @@ from sdimu_calibration.core.side_by_side import side_by_side
 _SHORTEST_DWELL_S = 3.0
 """Shortest dwell (s): what is shorter is a part of the turn."""
 _BLOCK = 48
-"""Number of effects, or of stretches, that a thread works on at a time: the regressors of all would take hundreds of
-megabytes."""
+"""Number of stretches that a thread works on at a time: fewer would repeat the response of the navigation."""
+_EFFECTS = 12
+"""Number of effects that a thread works on at a time: their regressors over an hour stay in its cache."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +210,7 @@ def columns(prepared: PreparedData, known: KnownPass, latitude: float, effects: 
         Change of each whitened innovation per SI unit of each parameter; rows in the order of `measured_rows`.
     """
     epochs, seen = _epochs(prepared), known.seen
-    blocks = [effects[start : start + _BLOCK] for start in range(0, len(effects), _BLOCK)]
+    blocks = [effects[start : start + _EFFECTS] for start in range(0, len(effects), _EFFECTS)]
     ends = np.cumsum([0, *(sum(len(effect.parameters) for effect in block) for block in blocks)])
     # Column by column in memory: what is chosen of them later is a few columns.
     W = np.zeros((int(np.isfinite(known.output.normalised).sum()), int(ends[-1])), order="F")
@@ -265,7 +266,8 @@ def _epochs(prepared: PreparedData) -> Epochs:
 
 def _terms(effects: Sequence[Effect], seen: Motion) -> Regressors:
     """Regressors of effects along a motion."""
-    values = np.empty((len(seen.t), sum(len(effect.terms) for effect in effects)))
+    # Each effect writes whole columns; the loops over cycles read rows, of a copy.
+    values = np.empty((len(seen.t), sum(len(effect.terms) for effect in effects)), order="F")
     channel: list[int] = []
     parameter: list[int] = []
     parameters = 0

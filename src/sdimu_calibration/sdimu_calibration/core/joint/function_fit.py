@@ -171,7 +171,9 @@ def _at_stops(found: JointEstimate, shared: SharedFunction, force: Floats) -> tu
         for axis in axes:
             own = np.flatnonzero(shared.of(f"{triad}_{'xyz'[axis]}"))
             mean[:, axis] = values @ weights[own]
-            sigma[:, axis] = np.sqrt(np.einsum("nk,kl,nl->n", values, covariance[np.ix_(own, own)], values))
+            sigma[:, axis] = np.sqrt(
+                np.einsum("nk,kl,nl->n", values, covariance[np.ix_(own, own)], values, optimize=True)
+            )
         if axes:
             out.append(UnknownFunction(triad, ATTITUDE, force, np.zeros(len(force), bool), mean, sigma, axes))
     return tuple(out)

@@ -94,7 +94,7 @@ def _scores(fit: SetFit, p: int) -> _Scores:
     # few power-ons leave open of the scatter, and would take more from the scores than the joint estimate does.
     unit = 1.0 / np.sqrt(np.diag(J))
     P = np.linalg.inv(J * np.outer(unit, unit)) * np.outer(unit, unit)
-    gram = within - np.einsum("mpq,qr,npr->pmn", X, P, X)
+    gram = within - np.einsum("mpq,qr,npr->pmn", X, P, X, optimize=True)
     return _Scores(gram, np.diagonal(within, axis1=1, axis2=2).T.copy(), d)
 
 

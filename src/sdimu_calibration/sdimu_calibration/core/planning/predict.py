@@ -154,7 +154,7 @@ def predict(
     J = body_frame.frame_jacobian(sensors.names, frame)
     output, epochs = done.output, nominal.prepared.epochs
     rows = np.arange(0, len(epochs), output.stride)
-    variance = np.einsum("ij,kjl,il->ki", J, output.covariance[: len(rows)], J)
+    variance = np.einsum("ij,kjl,il->ki", J, output.covariance[: len(rows)], J, optimize=True)
     covariance = J @ done.covariance @ J.T
     sigma = np.sqrt(np.diag(covariance))
     terms = () if noise is not None else stated_noise(imu)

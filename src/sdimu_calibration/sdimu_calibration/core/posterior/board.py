@@ -297,20 +297,42 @@ class Board(Generic[E]):
 
     def _gains(self, variants: Sequence[Effect], others: Members, noise: NoiseModel, size: float) -> Floats:
         """Log Bayes factor of each variant beside other members, by its better width; shape (variants,)."""
-        one, evidence = self.in_noise(noise), self.evidence
-        p = len(evidence.weight)
-        W = evidence.signature(variants)
+        p = len(self.evidence.weight)
         at = np.array([*range(p), *(p + k for k, _ in others)], dtype=np.int64)
-        _, weight = self.parameters(others)
-        own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
-        if noise.terms and self.wander is not None:
-            B = self.wander.across(W) @ one.R
-            own = own - np.einsum("ir,rs,is->i", B, one.inverse, B)
-            across, d = across - B @ one.X[:, at], d - B @ one.u
+        own, across, d = self.seen_of(self.evidence.signature(variants), at, noise)
+        one, weight = self.in_noise(noise), self.parameters(others)[1]
         X = solved(one.J[np.ix_(at, at)] + np.diag(weight), np.column_stack([across.T, one.d[at]]))
         c = (own - np.einsum("ik,ki->i", across, X[:, :-1])) * size**2
         r = (d - across @ X[:, -1]) * size
         return np.asarray(gains(np.maximum(c, 0.0), r, np.zeros(len(c), dtype=bool)).max(axis=1))
+
+    def seen_of(self, W: Floats, at: Ints, noise: NoiseModel) -> tuple[Floats, Floats, Floats]:
+        """Say what the data hold of parameters that are no candidates, in a noise.
+
+        Parameters
+        ----------
+        W : ndarray, shape (N, n)
+            Their signatures (whitened residual per SI unit).
+        at : ndarray of int, shape (k,)
+            Places of other parameters in `in_noise`.
+
+        Returns
+        -------
+        own : ndarray, shape (n,)
+            Information on each (1/SI^2).
+        across : ndarray, shape (n, k)
+            Information across each and the others.
+        d : ndarray, shape (n,)
+            Pull of each (1/SI).
+        """
+        one, evidence = self.in_noise(noise), self.evidence
+        own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
+        if noise.terms and self.wander is not None:
+            B = self.wander.across(W) @ one.R
+            # The modes are as stated, and so are these: an excess makes all smaller by the same factor.
+            own = own - np.einsum("ir,ir->i", B @ (one.inverse / self.excess), B)
+            across, d = across - B @ one.X[:, at], d - B @ one.u
+        return own / self.excess, across / self.excess, d / self.excess
 
 
 def same_noise(one: NoiseModel, other: NoiseModel, ratio: float = 1.35) -> bool:

@@ -162,9 +162,15 @@ class Expansion:
         found = additions(np.column_stack([c, r]), odds, self.data.prior.positive, _WIDTHS, least)
         return zip(*(part.tolist() for part in found), strict=True)
 
-    def merged(self) -> tuple[float, Members]:
-        """Put the best candidate in the place of two members: log posterior of the model, and the model."""
-        best, at, positive = -np.inf, self.members, self.data.prior.positive
+    def mergers(self) -> Iterator[tuple[Members, Floats]]:
+        """Log posterior with another candidate in the place of two members.
+
+        Returns
+        -------
+        iterator of (tuple of (int, int), ndarray)
+            The members that stay, and the log posterior of each model, shape (q, widths) (1).
+        """
+        positive = self.data.prior.positive
         for i, j in combinations(range(len(self.members)), 2):
             pair, others = [i, j], tuple(m for k, m in enumerate(self.members) if k not in (i, j))
             inverse, V, m = self._inverse[np.ix_(pair, pair)], self._V[:, pair], self._m[pair]
@@ -173,11 +179,16 @@ class Expansion:
                 continue
             table = gains(self.c + np.einsum("qa,ab,qb->q", V, own, V), self.r + V @ (own @ m), positive)
             table += self.data.prior.log_more([column for column, _ in others])[:, None]
-            column, width = np.unravel_index(int(np.argmax(table)), table.shape)
             there = -0.5 * float(m @ own @ m) - 0.5 * float(np.log(np.linalg.det(inverse) * self._loading[pair].prod()))
-            there += self._log_prior(others) - self._log_prior(self.members)
-            if self.score + there + table[column, width] > best:
-                best, at = self.score + there + float(table[column, width]), _with(others, int(column), int(width))
+            yield others, table + (self.score + there + self._log_prior(others) - self._log_prior(self.members))
+
+    def merged(self) -> tuple[float, Members]:
+        """Put the best candidate in the place of two members: log posterior of the model, and the model."""
+        best, at = -np.inf, self.members
+        for others, table in self.mergers():
+            column, width = np.unravel_index(int(np.argmax(table)), table.shape)
+            if table[column, width] > best:
+                best, at = float(table[column, width]), _with(others, int(column), int(width))
         return best, at
 
     def _log_prior(self, members: Members) -> float:

@@ -361,7 +361,7 @@ def _climbed(
     for _ in range(_ROUNDS):
         if members in asked:
             break
-        beside = [members, *starts] if settled else [members, _without_drifts(board, members), ()]
+        beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
         for one in dict.fromkeys(beside):
             if one in asked:
                 continue
@@ -415,7 +415,7 @@ def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: No
     known.append((score, noise, members))
 
 
-def _without_drifts(board: Board[E], members: Members) -> Members:
+def without_drifts(board: Board[E], members: Members) -> Members:
     """Leave out what noise with a memory may imitate."""
     first = len(board.evidence.weight)
     effects = [board.evidence.candidates[column - first].effect for column in board.columns(members)]

@@ -66,7 +66,7 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
         R = one.R[:, columns].reshape(cut.cells, 6, -1)[:, 3 * TRIADS.index(term.triad) :][:, :3]
         R = np.einsum("sn,ncr->scr", cut.at_stretches(term.kind), R)
         R = np.einsum("st,tcr->scr", left_by_coefficients(share, known.force if term.kind == ATTITUDE else None), R)
-        variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R)
+        variance = np.einsum("scr,rq,scq->sc", R, spread[np.ix_(columns, columns)], R, optimize=True)
         x, mean = known.variable(term.kind), R @ mode[columns]
         out.append(UnknownFunction(term.triad, term.kind, x, cut.turning, mean, np.sqrt(variance), term.axes))
     return tuple(out)
