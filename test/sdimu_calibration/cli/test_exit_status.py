@@ -201,7 +201,7 @@ def test_a_result_that_does_not_fit_is_compensated_and_exported_with_a_warning(s
 @pytest.mark.parametrize("number", [1, 2])
 def test_diagnose_ends_as_its_verdict_says(sdimu, bags, monkeypatch, number, verdict):
     monkeypatch.setattr(of_one, "verdict", lambda *_: verdict)
-    monkeypatch.setattr(of_set, "verdict", lambda *_: verdict)
+    monkeypatch.setattr(of_set, "verdict_of_set", lambda *_: verdict)
     status, _, err = sdimu("diagnose", *bags[:number])
     assert status == (3 if verdict == "unexplained" else 0)
     assert (f"not to be trusted: {verdict}: " in err) == (status == 3)

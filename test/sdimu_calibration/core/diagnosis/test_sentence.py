@@ -15,10 +15,7 @@ from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, si
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
-from sdimu_calibration.core.effects.selection import resolve
-from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding
-from sdimu_calibration.core.joint.set_verdict import verdict as verdict_of_set
+from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
@@ -79,10 +76,9 @@ def test_an_equation_that_fits_is_not_called_certain_physics(summary):
     ],
 )
 def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike, word):
-    (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
-    found = summary.diagnosis.found
-    assert verdict(Facts(found, (candidate,), alike, (), (), own=False, unexplained=False)) == word
-    of_set = SetFinding(candidate.label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
+    label = "gyro_bias_warm_up_x(tau=600 s)"
+    assert verdict(Facts([(label, alike)])) == word
+    of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
     assert verdict_of_set(SetFacts([of_set], after, SimpleNamespace(function=None), None, None)) == word
 
@@ -90,15 +86,21 @@ def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike,
 @pytest.mark.parametrize(
     ("nothing", "noise", "word"),
     [
-        (0.6, (), Verdict.CONSISTENT),
-        (0.4, (), Verdict.CLASS_OF_EFFECTS),
-        (0.6, ("a walk",), Verdict.NOISE_MODEL_WRONG),
-        (0.4, ("a walk",), Verdict.CLASS_OF_EFFECTS),
+        (0.6, False, Verdict.CONSISTENT),
+        (0.4, False, Verdict.CLASS_OF_EFFECTS),
+        (0.6, True, Verdict.NOISE_MODEL_WRONG),
+        (0.4, True, Verdict.CLASS_OF_EFFECTS),
     ],
 )
 def test_a_recording_is_consistent_where_nothing_is_more_likely_missing_than_something(nothing, noise, word):
-    found = SimpleNamespace(posterior=SimpleNamespace(nothing=nothing))
-    assert verdict(Facts(found, (), (), (), noise, own=False, unexplained=False)) == word
+    assert verdict(Facts(nothing=nothing, noise=noise)) == word
+
+
+def test_faults_of_one_recording_beside_an_effect_of_the_unit_are_no_second_effect():
+    label = "gyro_bias_warm_up_x(tau=600 s)"
+    assert verdict(Facts([(label, ())], of_recording=2)) == Verdict.ONE_EFFECT
+    assert verdict(Facts([(label, ()), ("accel_cubic_z", ())], of_recording=1)) == Verdict.SEVERAL_EFFECTS
+    assert verdict(Facts(of_recording=2)) == Verdict.DATA_FAULT
 
 
 def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):

@@ -202,8 +202,7 @@ def climb(
     raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))
     rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
-    facts = Facts(done.found, done.chosen, done.found.alike(0), findings, noise, own, bool(raised))
-    word = verdict(facts)
+    word = verdict(_facts(done, any(f.grave for f in findings), bool(raised), own, bool(noise)))
     progress("done", 1.0)
     unspoken = Diagnosis(
         word,
@@ -228,6 +227,14 @@ def climb(
     )
     found = found_effects(unspoken)
     return replace(unspoken, sentence=sentence(unspoken, found), found_effects=found)
+
+
+def _facts(done: Round, grave: bool, unexplained: bool, own: bool, noise: bool) -> Facts:
+    found, window = done.found, done.found.posterior
+    of_unit = [k for k, c in enumerate(done.chosen) if c.effect.scope != "recording"]
+    effects = [(done.chosen[k].label, found.alike(k)) for k in of_unit]
+    nothing = 1.0 if window is None else window.nothing
+    return Facts(effects, len(done.chosen) - len(of_unit), grave, unexplained, own, nothing, noise)
 
 
 def _findings(base: Fit, widened: Fit, done: Round) -> tuple[Finding, ...]:

@@ -10,13 +10,10 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.grades import LISTED, graded, in_grades, listed, other_coefficients
-from sdimu_calibration.core.diagnosis.screen import Finding
-from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
-from sdimu_calibration.core.evidence.candidate import OF_RECORDING, Candidate
+from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
-from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
 from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.posterior import PROBABLE
@@ -40,41 +37,43 @@ _EQUATION = "Missing for certain, and fitted by"
 
 @dataclass(frozen=True)
 class Facts:
-    """What the verdict follows from."""
+    """What the verdict on a recording, or on a set of them, follows from."""
 
-    found: Search[LinearEvidence]
-    chosen: tuple[Candidate, ...]
-    alike: tuple[str, ...]
-    """What the data cannot tell from the first of them."""
-    findings: tuple[Finding, ...]
-    noise: tuple[str, ...]
-    own: bool
-    unexplained: bool
+    effects: Sequence[tuple[str, tuple[str, ...]]] = ()
+    """Labels of what was found of the unit, each with what the data cannot tell from it."""
+    of_recording: int = 0
+    """Number of faults of one recording that were found."""
+    grave: bool = False
+    """Whether the data have a fault that the screen sees."""
+    unexplained: bool = False
+    """Whether something speaks against a model that has what was found."""
+    own: bool = False
+    """What was found are own equations, not registered effects."""
+    nothing: float = 1.0
+    """Probability that nothing is missing."""
+    noise: bool = False
+    """Whether the noise is not as the IMU file states it."""
 
 
 def verdict(facts: Facts) -> Verdict:
     """Give the verdict."""
-    chosen = facts.chosen
-    if any(f.grave for f in facts.findings):
+    if facts.grave:
         return Verdict.DATA_FAULT
     if facts.unexplained:
         return Verdict.UNEXPLAINED
-    if chosen:
-        if facts.own:
-            return Verdict.OWN_EQUATION
-        if len(chosen) > 1:
-            return Verdict.SEVERAL_EFFECTS
-        if chosen[0].effect.scope == "recording":
-            return Verdict.DATA_FAULT
-        open_which = other_coefficients(chosen[0].label, facts.alike)
+    if facts.own:
+        return Verdict.OWN_EQUATION
+    if len(facts.effects) > 1:
+        return Verdict.SEVERAL_EFFECTS
+    if facts.effects:
+        open_which = other_coefficients(*facts.effects[0])
         return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
-    window = facts.found.posterior
-    if window is not None and window.nothing < PROBABLE:
+    if facts.of_recording:
+        return Verdict.DATA_FAULT
+    if facts.nothing < PROBABLE:
         # Something is missing, and no class by itself is likely: together they are.
         return Verdict.CLASS_OF_EFFECTS
-    if facts.noise:
-        return Verdict.NOISE_MODEL_WRONG
-    return Verdict.CONSISTENT
+    return Verdict.NOISE_MODEL_WRONG if facts.noise else Verdict.CONSISTENT
 
 
 def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
@@ -92,7 +91,8 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
         nothing = nothing_missing(d.probabilities)
         return f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}."
     if d.verdict == Verdict.DATA_FAULT:
-        faults = [f.text for f in d.findings if f.grave] or [f"{names} (a fault of this recording)"]
+        what = "faults" if len(d.chosen) > 1 else "a fault"
+        faults = [f.text for f in d.findings if f.grave] or [f"{names} ({what} of this recording)"]
         return f"The data have a fault: {'; '.join(faults)}."
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import size
+from sdimu_calibration.core.diagnosis.grades import LISTED, size
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
@@ -28,7 +28,7 @@ from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
-from sdimu_calibration.core.joint.set_verdict import LISTED, SetFacts, SetFinding, sentence, verdict
+from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, sentence, verdict_of_set
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
@@ -98,7 +98,7 @@ def diagnose_set(
     again = recurrence(leftovers(found.after, run))
     told = probabilities(found.posterior) if found.stood else None
     facts = SetFacts(_findings(found), after, found.after, again, told)
-    word = verdict(facts)
+    word = verdict_of_set(facts)
     refused: tuple[SetFinding, ...] = ()
     why = "" if found.stood else f"{TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}."
     if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
@@ -117,7 +117,7 @@ def diagnose_set(
         refused += tuple(f for f in facts.findings if f.tag in needed_not)
         why = f"{_explained(again, needed_not)} {why}".strip()
         facts = SetFacts(_findings(found), set_outcome(found.after), found.after, again, None)
-        word = verdict(facts)
+        word = verdict_of_set(facts)
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     steps = next_steps(again, facts.beside_function)

@@ -7,16 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.grades import (
-    NAMED,
-    Graded,
-    in_grades,
-    named,
-    other_coefficients,
-    size,
-    without_variant,
-)
-from sdimu_calibration.core.diagnosis.verdict import nothing_missing, something_missing
+from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
+from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, in_grades, named, size, without_variant
+from sdimu_calibration.core.diagnosis.verdict import Facts, nothing_missing, something_missing, verdict
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words
@@ -25,16 +18,9 @@ from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_result import SCATTERS
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
-from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
-
-_STILL_WRONG = 1.25
-"""Held-out error (sigma) from which a model is not called explained, as for one recording, where chance does not
-reach it: 1 is right."""
-LISTED = 4
-"""Number of effects that a sentence names: the table has the rest."""
 
 
 @dataclass(frozen=True)
@@ -94,27 +80,18 @@ class SetFacts:
         return self.again is not None and len(self.again.answer) > 0
 
 
-def verdict(facts: SetFacts) -> Verdict:
+def verdict_of_set(facts: SetFacts) -> Verdict:
     """Give the verdict."""
     findings, error = facts.findings, facts.after.fit["held_out_rms"]
-    shared = [f for f in findings if not f.recording]
-    if facts.beside_function:
-        return Verdict.UNEXPLAINED
-    still = error is not None and error > _STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
+    shared = [(f.label, f.alike) for f in findings if not f.recording]
+    still = error is not None and error > STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
     left = _scatter(facts.after) < SCATTERS or still or facts.comes_back
     # A fault leaves traces in its recording that are no physics of the unit.
-    if left and (shared or not findings):
-        return Verdict.UNEXPLAINED
-    if len(shared) > 1:
-        return Verdict.SEVERAL_EFFECTS
-    if shared:
-        open_which = other_coefficients(shared[0].label, shared[0].alike)
-        return Verdict.CLASS_OF_EFFECTS if open_which else Verdict.ONE_EFFECT
-    if findings:
-        return Verdict.DATA_FAULT
-    if facts.told is None:
-        return Verdict.UNEXPLAINED
-    return Verdict.CLASS_OF_EFFECTS if facts.told.nothing < PROBABLE else Verdict.CONSISTENT
+    unexplained = facts.beside_function or (left and (bool(shared) or not findings))
+    # A search that came to no end, or whose finds were taken back, says that something is missing.
+    unexplained |= not findings and facts.told is None
+    nothing = 1.0 if facts.told is None else facts.told.nothing
+    return verdict(Facts(shared, len(findings) - len(shared), unexplained=unexplained, nothing=nothing))
 
 
 def _scatter(result: Calibration) -> float:
