@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.effects.selection import resolve
@@ -195,3 +196,5 @@ def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
     closed = diagnose_set(three.members, options, here)
     assert [f.label for f in closed.findings] == ["gyro_scale_asymmetry_y"]
     assert "gyro_scale_quadratic_y" not in closed.findings[0].alike
+    assert found.advice[0] == Advice(Kind.TRY, ("gyro_scale_asymmetry_y",), Verb.ADD, ("gyro_scale_asymmetry_y",))
+    assert closed.advice[0] == replace(found.advice[0], kind=Kind.KEEP)

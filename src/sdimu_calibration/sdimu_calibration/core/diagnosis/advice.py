@@ -129,18 +129,25 @@ def _about_unknown(d: Diagnosis, found: tuple[Found, ...]) -> list[Advice]:
 
 def add(found: Sequence[Found], told: Probabilities | None = None) -> list[Advice]:
     """Advise how what was found gets into the model: what is decided to stay, what is open to be tried."""
-    decided: list[Found] = []
-    doubtful: list[Found] = []
-    for one, grade in zip(found, graded(found, told), strict=True):
-        settled = one.decided and not grade.is_open
-        (decided if settled else doubtful).append(one)
+    grades = graded(found, told)
+    return adding(
+        [
+            (one.candidate.label, one.candidate.added, one.decided and not grade.is_open)
+            for one, grade in zip(found, grades, strict=True)
+        ]
+    )
+
+
+def adding(found: Sequence[tuple[str, str, bool]]) -> list[Advice]:
+    """Advise the same of labels, each with the key that adds it, and whether it is decided."""
+    decided, doubtful = ([one for one in found if one[2] is sure] for sure in (True, False))
     out = [_adding(Kind.KEEP, decided, decided)] if decided else []
     return [*out, _adding(Kind.TRY, doubtful, found)] if doubtful else out
 
 
-def _adding(kind: Kind, named: Sequence[Found], added: Sequence[Found]) -> Advice:
-    label = named[0].candidate.label if len(named) == 1 else None
-    return Advice(kind, (label,), Verb.ADD, tuple(one.candidate.added for one in added))
+def _adding(kind: Kind, named: Sequence[tuple[str, str, bool]], added: Sequence[tuple[str, str, bool]]) -> Advice:
+    label = named[0][0] if len(named) == 1 else None
+    return Advice(kind, (label,), Verb.ADD, tuple(key for _, key, _ in added))
 
 
 def others(one: Found) -> tuple[str, ...]:

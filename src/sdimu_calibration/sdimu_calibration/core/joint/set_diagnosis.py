@@ -9,11 +9,12 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.advice import adding
 from sdimu_calibration.core.diagnosis.grades import LISTED, size
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.references import SEEN_AS_GRAVITY
+from sdimu_calibration.core.effects.references import LATITUDE, SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
@@ -121,6 +122,7 @@ def diagnose_set(
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     steps = next_steps(again, facts.beside_function)
+    kept = [] if word == Verdict.UNEXPLAINED else _added(found, facts.findings)
     return SetDiagnosis(
         word,
         f"{sentence(word, facts)} {why}".strip(),
@@ -128,7 +130,7 @@ def diagnose_set(
         before,
         facts.after,
         found.threshold,
-        _advice(word, facts.findings, next_recording(found.after, standing, test), steps),
+        (*kept, *_advice(word, facts.findings, next_recording(found.after, standing, test), steps)),
         standing,
         found.first,
         again,
@@ -200,6 +202,12 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         )
         for label, title, recording, k, z, p, alike, probability in (*shared, *own)
     )
+
+
+def _added(found: SetSearch, findings: Sequence[SetFinding]) -> list[Advice]:
+    """Advise how what was found of the unit gets into its model: no wrong site."""
+    keys = {c.label: c.added for c in found.chosen if c.family != LATITUDE.name}
+    return adding([(f.label, keys[f.label], f.decided) for f in findings if f.label in keys and not f.recording])
 
 
 def _against(label: str, recording: str, recordings: Sequence[str]) -> str:

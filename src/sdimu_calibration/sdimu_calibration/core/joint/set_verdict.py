@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
+from sdimu_calibration.core.diagnosis.found import DECIDED
 from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, in_grades, named, size, without_variant
 from sdimu_calibration.core.diagnosis.verdict import Facts, nothing_missing, something_missing, verdict
 from sdimu_calibration.core.joint.changed import is_change
@@ -47,6 +48,11 @@ class SetFinding:
     against: str = ""
     """The other one of two recordings, where a coefficient is not the same in both: no data tell which of them changed.
     Empty for all else."""
+
+    @property
+    def decided(self) -> bool:
+        """Whether it is sure that it is missing, and not something else of its class."""
+        return self.probability >= DECIDED and not _graded(self).is_open
 
     @property
     def tag(self) -> str:
