@@ -198,15 +198,15 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     holds = ", which hold what was found" if found.findings else ""
     advice: tuple[Advice | str, ...] = found.advice or (f"Use the coefficients of this page{holds}.",)
     told = tuple(advice_html(one, spell) for one in advice)
-    tone, tag = _set_judged(found, after)
+    tone, tag = set_judged(found)
     title = _COSTS if found.findings else _PREDICTS
     return FirstScreen(tone, prose(found.sentence), tuple(costs), told, title, tag=tag)
 
 
-def _set_judged(found: SetDiagnosis, error: float) -> tuple[str, str]:
-    """Tone of the page of a set, and the word for it."""
+def set_judged(found: SetDiagnosis) -> tuple[str, str]:
+    """Tone of what is said of a set, and the word for it."""
     if found.verdict == Verdict.CONSISTENT:
-        tone = DOUBTFUL if error > MISFIT else GOOD
+        tone = DOUBTFUL if held_out(found.after) > MISFIT else GOOD
         return tone, _WORDS[tone]
     if found.verdict == Verdict.UNEXPLAINED:
         return BAD, _WORDS[BAD]

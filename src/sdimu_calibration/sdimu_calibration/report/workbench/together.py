@@ -11,7 +11,7 @@ from dash import State as Kept
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError, from_si
-from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.first_screen import set_judged
 from sdimu_calibration.report.table import with_sigma
 from sdimu_calibration.report.workbench.elements import table
 from sdimu_calibration.report.workbench.state import from_json
@@ -60,10 +60,8 @@ def shown(found: SetDiagnosis) -> list[Any]:
         for f in found.findings
     ]
     heads = ("effect", "in", "size", "score", "looks the same")
-    bad = {Verdict.UNEXPLAINED, Verdict.DATA_FAULT}
-    tone = "good" if found.verdict == Verdict.CONSISTENT else "bad" if found.verdict in bad else "doubtful"
     return [
-        html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {tone}"),
+        html.P(f"{found.verdict}: {found.sentence}", className=f"verdict {set_judged(found)[0]}"),
         *([table(heads, rows)] if rows else []),
         *(html.P(f"Advice: {sentence(one)}") for one in found.advice),
     ]
