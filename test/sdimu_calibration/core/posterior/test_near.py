@@ -15,7 +15,6 @@ from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.near import near
@@ -46,7 +45,8 @@ def fit():
 
 @pytest.fixture(scope="module")
 def every(fit):
-    return [*equations(fit.has_temperature), *periodic(fit.timetable.duration)]
+    both = [*equations(fit.has_temperature), *periodic(fit.timetable.duration)]
+    return [one for effect in both for one in effect.singles]
 
 
 def test_what_is_kept_is_what_one_or_two_moves_bring_near_the_best_model(fit, every):
@@ -54,7 +54,8 @@ def test_what_is_kept_is_what_one_or_two_moves_bring_near_the_best_model(fit, ev
     wander = Wander.of(whole.evidence)
     found = search(whole.evidence, whole.allowed, wander).posterior
     assert any(noise.terms for noise, p in found.noises if p > 0.02)
-    kept = {effect.labels[0] for effect in near(found, every)[0]}
+    is_near = near(found, every, found.board.evidence.signature(every))
+    kept = {effect.labels[0] for effect, kept in zip(every, is_near, strict=True) if kept}
 
     wide = found.board.evidence.with_effects(every)
     first = len(found.board.evidence.names)
@@ -75,16 +76,12 @@ def test_what_is_kept_is_what_one_or_two_moves_bring_near_the_best_model(fit, ev
         scores = offset + np.max(tables, axis=(0, 2))[added]
         near_ones |= {wide.names[board.use[k]] for k, score in zip(added, scores, strict=True) if score > best - WINDOW}
     assert near_ones <= kept
-    assert len(kept) < 0.2 * sum(len(split(effect)) for effect in every)
+    assert len(kept) < 0.2 * len(every)
 
 
 def test_a_diagnosis_tells_what_it_tells_with_all_of_them(fit, monkeypatch):
     few = climb(fit)
-    monkeypatch.setattr(
-        ground,
-        "near",
-        lambda found, effects: ([c.effect for e in effects for c in split(e)], found.board.evidence.signature(effects)),
-    )
+    monkeypatch.setattr(ground, "near", lambda *three: np.ones(len(three[1]), dtype=bool))
     whole = climb(fit)
     assert few.found.passed > 0
     assert whole.found.passed == 0

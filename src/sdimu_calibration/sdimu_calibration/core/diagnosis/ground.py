@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.posterior.near import near
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Option
@@ -46,6 +47,15 @@ class Request:
 
 
 @dataclass(frozen=True)
+class Aside:
+    """Equations of one parameter each, n of them, and their signatures."""
+
+    effects: tuple[Effect, ...]
+    signature: Floats
+    """Shape (N, n). Whitened residual per SI unit."""
+
+
+@dataclass(frozen=True)
 class Ground:
     """A fit with what was tried, and the evidence about it."""
 
@@ -56,8 +66,13 @@ class Ground:
     """`tried` is among its candidates."""
     free: Ints
     """Columns of the free inputs in `evidence`, shape (f,)."""
-    passed: int = 0
-    """Number of equations that were looked at and are no candidates, as they are far from every model."""
+    aside: Aside | None = None
+    """Equations that are no candidates, as they are far from every model; None where none were looked at."""
+
+    @property
+    def passed(self) -> int:
+        """Number of equations that were looked at and are no candidates."""
+        return 0 if self.aside is None else len(self.aside.effects)
 
     @property
     def allowed(self) -> Ints:
@@ -84,29 +99,39 @@ def fresh_ground(request: Request, fit: Fit, tried: Sequence[Candidate], own: bo
 
 
 def next_ground(
-    request: Request, fit: Fit, tried: Sequence[Candidate], own: bool, found: Search[LinearEvidence], free: Ints
+    request: Request, before: Ground, fit: Fit, tried: Sequence[Candidate], own: bool, found: Search[LinearEvidence]
 ) -> Ground:
     """Take the evidence about a fit, with the signatures of the search that chose `tried`.
 
     Parameters
     ----------
-    request, fit, tried, own
-        As for `fresh_ground`.
-    found : Search
-        About the fit before, which differs little.
-    free : ndarray of int, shape (f,)
-        Columns of the free inputs of its evidence.
+    before : Ground
+        Of that search: a fit that differs little.
+    fit : Fit
+        The model as given with `tried`.
+    own : bool
+        Also equations that are not in the catalogue.
     """
     if request.base.learns_scatter:
         return fresh_ground(request, fit, tried, own)
-    before = found.evidence if found.white is None else found.white
-    evidence, passed = before.about(request.in_inner(fit.bare), fit.added_columns(len(tried)), tried), found.passed
-    if own and found.posterior and not any(c.family == "own" for c in evidence.candidates):
-        more = _untried(candidates(request, (), own), frozenset(evidence.names))
-        kept, signature = near(found.posterior, more)
-        passed = sum(len(e.parameters) for e in more) - len(kept)
-        evidence = _without_doubles(evidence, kept, signature)
-    return Ground(fit, tuple(tried), evidence, free, passed)
+    known = found.evidence if found.white is None else found.white
+    evidence = known.about(request.in_inner(fit.bare), fit.added_columns(len(tried)), tried)
+    ground = Ground(fit, tuple(tried), evidence, before.free, before.aside)
+    return ground if not own or found.posterior is None else _with_equations(request, ground, found.posterior)
+
+
+def _with_equations(request: Request, ground: Ground, found: Posterior[LinearEvidence]) -> Ground:
+    """Make candidates of the equations that are near a model: beside one that is told others come near."""
+    evidence, aside = ground.evidence, ground.aside
+    if aside is None:
+        untried = _untried(candidates(request, (), own=True), frozenset(evidence.names))
+        singles = tuple(one for effect in untried for one in effect.singles)
+        aside = Aside(singles, evidence.signature(singles))
+    kept = near(found, aside.effects, aside.signature)
+    effects = [effect for effect, is_near in zip(aside.effects, kept.tolist(), strict=True) if is_near]
+    others = [effect for effect, is_near in zip(aside.effects, kept.tolist(), strict=True) if not is_near]
+    wider = _without_doubles(evidence, effects, aside.signature[:, kept])
+    return replace(ground, evidence=wider, aside=Aside(tuple(others), aside.signature[:, ~kept]))
 
 
 def extended(request: Request, chosen: Sequence[Candidate], progress: Progress) -> Fit:

@@ -114,15 +114,15 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))
             exact = with_attitude_functions(request, done.found)
-            wider = next_ground(exact, ground.fit, ground.tried, True, done.found, ground.free)
+            wider = next_ground(exact, ground, ground.fit, ground.tried, True, done.found)
             wide = run_round(exact, wider, True, limits, done)
             if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
-                request, done, own = exact, wide, True
+                request, done, own, ground = exact, wide, True, wider
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
         if stood:
             break
         trial = extended(request, done.chosen, progress)
-        ground = next_ground(request, trial, done.chosen, own, done.found, ground.free)
+        ground = next_ground(request, ground, trial, done.chosen, own, done.found)
     if done is None:
         raise AssertionError("a search has one round at least")
     # Before the fit: its noise has the intervals that are stated here.

@@ -306,7 +306,9 @@ class Board(Generic[E]):
         r = (d - across @ X[:, -1]) * size
         return np.asarray(gains(np.maximum(c, 0.0), r, np.zeros(len(c), dtype=bool)).max(axis=1))
 
-    def seen_of(self, W: Floats, at: Ints, noise: NoiseModel) -> tuple[Floats, Floats, Floats]:
+    def seen_of(
+        self, W: Floats, at: Ints, noise: NoiseModel, on_wander: Floats | None = None
+    ) -> tuple[Floats, Floats, Floats]:
         """Say what the data hold of parameters that are no candidates, in a noise.
 
         Parameters
@@ -315,6 +317,8 @@ class Board(Generic[E]):
             Their signatures (whitened residual per SI unit).
         at : ndarray of int, shape (k,)
             Places of other parameters in `in_noise`.
+        on_wander : ndarray, shape (n, m), optional
+            Information across them and the m errors of `wander`, where it is known (1/SI^2).
 
         Returns
         -------
@@ -328,7 +332,7 @@ class Board(Generic[E]):
         one, evidence = self.in_noise(noise), self.evidence
         own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
         if noise.terms and self.wander is not None:
-            B = self.wander.across(W) @ one.R
+            B = (self.wander.across(W) if on_wander is None else on_wander) @ one.R
             # The modes are as stated, and so are these: an excess makes all smaller by the same factor.
             own = own - np.einsum("ir,ir->i", B @ (one.inverse / self.excess), B)
             across, d = across - B @ one.X[:, at], d - B @ one.u

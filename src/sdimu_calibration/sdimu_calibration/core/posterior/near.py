@@ -37,8 +37,8 @@ _LIKELY = 0.02
 told."""
 
 
-def near(found: Posterior[E], effects: Sequence[Effect]) -> tuple[list[Effect], Floats]:
-    """Keep the parameters of effects that one or two moves bring near the best model.
+def near(found: Posterior[E], effects: Sequence[Effect], signature: Floats) -> Bools:
+    """Say which of very many effects one or two moves bring near the best model.
 
     Moves are those of the search: one more, one in the place of a member, one in the place of two; and one beside
     nothing, or beside what is no drift, that explains as much as the best candidate does.
@@ -47,33 +47,32 @@ def near(found: Posterior[E], effects: Sequence[Effect]) -> tuple[list[Effect], 
     ----------
     found : Posterior
         Of all other candidates.
-    effects : sequence of Effect
-        None of which is a candidate.
+    effects : sequence of Effect, length n
+        Of one parameter each.
+    signature : ndarray, shape (N, n)
+        Of these (whitened residual per SI unit).
 
     Returns
     -------
-    kept : list of Effect
-        One for each parameter.
-    signature : ndarray, shape (N, len(kept))
-        Of these (whitened residual per SI unit).
+    ndarray of bool, shape (n,)
     """
-    board = found.board
-    W = board.evidence.signature(effects)
+    board, W = found.board, signature
     candidates, size = candidate_priors(effects, board.evidence.imu)
     models = list(dict.fromkeys([found.best.members, found.told.members]))
     beside = list(dict.fromkeys([(), *(without_drifts(board, one) for one in models)]))
     likely = [noise for noise, p in found.noises if p > _LIKELY]
     best = max(offset + data.at(one).score for offset, data in map(board.data, likely) for one in models)
     prior = _prior(board, candidates)
+    on_wander = None if board.wander is None else board.wander.across(W)
     keep = np.zeros(len(candidates), dtype=bool)
     for noise in dict.fromkeys([NoiseModel(), *likely]):
         offset, every = board.data(noise)
-        more = _beside(board, noise, W, size, prior, models)
+        more = _beside(board, noise, W, on_wander, size, prior, models)
         for members in models:
             keep |= offset + more.moved(members) > best - _BEHIND
         for members in beside:
             keep |= more.begins(members, _FIRST * _explained(every.at(members)).max(initial=0.0))
-    return [c.effect for c, kept in zip(candidates, keep.tolist(), strict=True) if kept], W[:, keep]
+    return keep
 
 
 @dataclass(frozen=True)
@@ -106,17 +105,23 @@ def _explained(here: Expansion) -> Floats:
 
 
 def _beside(
-    board: Board[E], noise: NoiseModel, W: Floats, size: Floats, prior: Prior, models: Sequence[Members]
+    board: Board[E],
+    noise: NoiseModel,
+    W: Floats,
+    on_wander: Floats | None,
+    size: Floats,
+    prior: Prior,
+    models: Sequence[Members],
 ) -> _More:
     """Put the members of models and n candidates of signatures W (N, n) together in a noise.
 
-    `size` (n,) is the one-sigma size of the candidates (SI), inf where unknown; `prior` that of all candidates of the
-    board and of these.
+    `on_wander` is as for `Board.seen_of`; `size` (n,) is the one-sigma size of the candidates (SI), inf where unknown;
+    `prior` is that of all candidates of the board and of these.
     """
     numbers = sorted({number for one in models for number, _ in one})
     k, p = len(numbers), len(board.evidence.weight)
     one, known = board.in_noise(noise), board.data(noise)[1]
-    own, across, d = board.seen_of(W, np.array([*range(p), *(p + number for number in numbers)]), noise)
+    own, across, d = board.seen_of(W, np.array([*range(p), *(p + number for number in numbers)]), noise, on_wander)
     X = solved(one.J[:p, :p] + np.diag(board.evidence.weight), np.column_stack([across[:, :p].T, one.d[:p]]))
     c = own - np.einsum("ik,ki->i", across[:, :p], X[:, :-1])
     size = np.where(np.isfinite(size), size, UNKNOWN_SIZE / np.sqrt(np.maximum(own, 1e-300)))
