@@ -9,7 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sdimu_calibration.cli.set_run import page_title, table_heading
+from sdimu_calibration.cli.next_commands import spelled
+from sdimu_calibration.cli.options import FitRequest, StatedOpening
+from sdimu_calibration.cli.set_run import SetRequest, page_title, table_heading, to_repeat
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary, no_history
 from sdimu_calibration.report.page import Contents, page
 
@@ -51,6 +54,21 @@ def test_a_title_counts_what_was_used(file, refused, title):
 def test_the_table_names_what_was_refused():
     assert table_heading(of(2, "c.mcap")).startswith("2 of 3 recordings together, without c.mcap,")
     assert table_heading(of(2)).startswith("2 recordings together, body frame")
+
+
+@pytest.mark.parametrize(
+    ("bags", "file", "of_what"),
+    [([Path("a"), Path("b")], None, "a b"), (None, Path("my set.yaml"), "--set 'my set.yaml'")],
+)
+def test_what_is_advised_repeats_all_that_was_asked(bags, file, of_what):
+    opening = StatedOpening(site="daejeon", imu="dtg", gyro_unit="deg/s")
+    request = FitRequest(set_file=file, model="mine.yaml", add=["accel_cubic_x"])
+    advised = Advice(Kind.KEEP, ("accel_quadratic_z",), Verb.ADD, ("accel_quadratic_z",))
+    command = spelled(advised, to_repeat(SetRequest(bags, opening, request), Path("out")))
+    assert command == (
+        f"sdimu calibrate {of_what} --site daejeon --imu dtg --model mine.yaml --gyro-unit deg/s "
+        "--add accel_cubic_x --add 'accel_quadratic_z'"
+    )
 
 
 @pytest.mark.parametrize(("names", "said"), [(("day1", "day2"), "day1, day2<"), ("abcdef", "a, b, c, d and others<")])

@@ -15,7 +15,7 @@ import typer
 from sdimu_calibration.cli.console import answer, plain, say
 from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
 from sdimu_calibration.cli.opened import folder_for_result, leave, printing, tell
-from sdimu_calibration.cli.options import FitRequest, Place, StatedOpening
+from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -105,7 +105,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     found, members = diagnosed_set(console, asked, extra)
     after = _with_serial(found.after, members)
     folder = _folder(asked, "diagnosis")
-    about = Asked.of(asked.bags, folder, Place(asked.opening.site, asked.opening.imu))
+    about = to_repeat(asked, folder)
     with written_together(folder) as part:
         write_set_diagnosis(part / "set.json", found)
         write_result(part / "result.json", after, found.verdict)
@@ -127,6 +127,12 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.request.as_json)
     leave(after, (found.verdict, found.sentence))
+
+
+def to_repeat(asked: SetRequest, folder: Path) -> Asked:
+    """Return what the next verb about the same set has to repeat; its results are in `folder`."""
+    about = Asked.of(asked.bags or (), folder, asked.opening, asked.request)
+    return replace(about, options=["--set", str(asked.file), *about.options]) if asked.file else about
 
 
 def diagnosed_set(

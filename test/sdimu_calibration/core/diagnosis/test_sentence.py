@@ -15,6 +15,8 @@ from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, si
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
+from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
@@ -101,6 +103,20 @@ def test_faults_of_one_recording_beside_an_effect_of_the_unit_are_no_second_effe
     assert verdict(Facts([(label, ())], of_recording=2)) == Verdict.ONE_EFFECT
     assert verdict(Facts([(label, ()), ("accel_cubic_z", ())], of_recording=1)) == Verdict.SEVERAL_EFFECTS
     assert verdict(Facts(of_recording=2)) == Verdict.DATA_FAULT
+
+
+def test_a_fault_of_the_recording_is_told_by_itself_with_size_and_probability(summary):
+    (lost,) = split(resolve("gyro_lost_data(turn=3, at=289.9 s)"))
+    (effect,) = with_shares(summary, 0.999, (own(summary), 0.999)).found
+    fault = replace(effect, candidate=lost, value=0.1, sigma=0.001, probability=0.7, of_family=0.7, may_be=())
+    d = replace(summary.diagnosis, verdict=Verdict.ONE_EFFECT)
+    words = sentence(d, (fault, effect))
+    told = "Likely (70 %): gyro data lost in a turn (turn=3, at=289.9 s) (100.0 +- 1.0 ms)."
+    assert words == f"{sentence(d, (effect,))} The data have a fault in this recording. {told}"
+    alone = sentence(replace(d, verdict=Verdict.DATA_FAULT, findings=()), (fault, fault))
+    assert alone.startswith("The data have a fault in this recording. Likely (70 %): ")
+    equation = sentence(replace(d, own=True, verdict=Verdict.OWN_EQUATION), (fault, effect))
+    assert "lost" not in equation.partition("The data have a fault")[0]
 
 
 def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):

@@ -125,8 +125,7 @@ def _with_equations(request: Request, ground: Ground, found: Posterior[LinearEvi
     evidence, aside = ground.evidence, ground.aside
     if aside is None:
         untried = _untried(candidates(request, (), own=True), frozenset(evidence.names))
-        singles = tuple(one for effect in untried for one in effect.singles)
-        aside = Aside(singles, evidence.signature(singles))
+        aside = Aside(tuple(one for effect in untried for one in effect.singles), evidence.signature(untried))
     kept = near(found, aside.effects, aside.signature)
     effects = [effect for effect, is_near in zip(aside.effects, kept.tolist(), strict=True) if is_near]
     others = [effect for effect, is_near in zip(aside.effects, kept.tolist(), strict=True) if not is_near]

@@ -108,6 +108,7 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
     limits: dict[bool, float] = {}
     done: Round | None = None
     for turn in range(MOST_ROUNDS):
+        beside = False
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
         done = run_round(request, ground, own, limits, done)
         if done.wants_equations and not own and not asked:
@@ -117,11 +118,13 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
             wider = next_ground(exact, ground, ground.fit, ground.tried, True, done.found)
             wide = run_round(exact, wider, True, limits, done)
             if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
+                # Equations that come near beside a function of the attitude alone were not looked at yet.
+                beside = exact is not request and turn + 1 < MOST_ROUNDS
                 request, done, own, ground = exact, wide, True, wider
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
-        if stood:
+        if stood and not beside:
             break
-        trial = extended(request, done.chosen, progress)
+        trial = ground.fit if stood else extended(request, done.chosen, progress)
         ground = next_ground(request, ground, trial, done.chosen, own, done.found)
     if done is None:
         raise AssertionError("a search has one round at least")
@@ -171,8 +174,8 @@ def run_round(request: Request, ground: Ground, own: bool, limits: dict[bool, fl
     own : bool
         Whether equations that are not in the catalogue are among its candidates.
     limits : dict of bool to float
-        Thresholds of scans without and with equations, filled as they become known: the columns of all rounds are the
-        same but for finer variants, and so is the threshold.
+        Thresholds of scans without and with equations, filled as they become known: all rounds look at the same columns
+        but for finer variants, and so have the same threshold.
     earlier : Round, optional
         The round before.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import LISTED, graded, in_grades, listed, other_coefficients
+from sdimu_calibration.core.diagnosis.grades import LISTED, Graded, graded, in_grades, listed, other_coefficients
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
@@ -91,18 +91,30 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
         nothing = nothing_missing(d.probabilities)
         return f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}."
     if d.verdict == Verdict.DATA_FAULT:
-        what = "faults" if len(d.chosen) > 1 else "a fault"
-        faults = [f.text for f in d.findings if f.grave] or [f"{names} ({what} of this recording)"]
-        return f"The data have a fault: {'; '.join(faults)}."
+        grave = [f.text for f in d.findings if f.grave]
+        return f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found)
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, names)
     if not d.chosen and d.probabilities is not None:
         return something_missing(d.probabilities)
-    every = graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities)
-    if not d.own:
-        return in_grades(every)
+    every = _graded(d, [one for one in found if not _is_fault(one)])
     # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    return f"No effect of the catalogue fits, an equation does. {in_grades(every, _EQUATION)}"
+    own = f"No effect of the catalogue fits, an equation does. {in_grades(every, _EQUATION)}"
+    return f"{own if d.own else in_grades(every)} {_of_recording(d, found)}".strip()
+
+
+def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:
+    """Say what is wrong with this recording alone; empty where nothing is."""
+    faults = _graded(d, [one for one in found if _is_fault(one)])
+    return f"The data have a fault in this recording. {in_grades(faults)}" if faults else ""
+
+
+def _graded(d: Diagnosis, found: Sequence[Found]) -> tuple[Graded, ...]:
+    return graded(sorted(found, key=lambda one: -one.log_likelihood_gain), d.probabilities)
+
+
+def _is_fault(one: Found) -> bool:
+    return one.candidate.effect.scope == "recording"
 
 
 def nothing_missing(told: Probabilities | None) -> str:
@@ -113,12 +125,12 @@ def nothing_missing(told: Probabilities | None) -> str:
 def something_missing(told: Probabilities) -> str:
     """Say that something is missing where no effect by itself is probable: the likeliest, each with its probability."""
     members = sorted((one for f in told.families for one in f.members), key=lambda one: -one.probability)
-    likely = ", ".join(f"{_of_recording(one.label)} {in_percent(one.probability)}" for one in members[:LISTED])
+    likely = ", ".join(f"{_in_words(one.label)} {in_percent(one.probability)}" for one in members[:LISTED])
     which = f"no effect by itself is likely: {likely}" if likely else "none of very many effects by itself is likely"
     return f"Something is missing ({in_percent(1.0 - told.nothing)}), but {which}."
 
 
-def _of_recording(label: str) -> str:
+def _in_words(label: str) -> str:
     """Write a label, that of one recording with its name in words."""
     key, _, recording = label.partition(OF_RECORDING)
     return f"{key} in {recording}" if recording else key

@@ -59,7 +59,8 @@ class Candidate:
 def split(effect: Effect) -> list[Candidate]:
     """One candidate for each parameter of an effect."""
     family = "own" if effect.title == OWN else effect.family or effect.name
-    return [Candidate(one, family, label) for one, label in zip(effect.singles, effect.labels, strict=True)]
+    singles = effect.singles if len(effect.parameters) > 1 else (effect.only((effect.parameters[0].name,)),)
+    return [Candidate(one, family, label) for one, label in zip(singles, effect.labels, strict=True)]
 
 
 def of_the_sensor(variant: Effect, name: str) -> str:

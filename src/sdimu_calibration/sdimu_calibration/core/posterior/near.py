@@ -38,10 +38,11 @@ told."""
 
 
 def near(found: Posterior[E], effects: Sequence[Effect], signature: Floats) -> Bools:
-    """Say which of very many effects one or two moves bring near the best model.
+    """Say which of very many effects a move brings near the best model.
 
-    Moves are those of the search: one more, one in the place of a member, one in the place of two; and one beside
-    nothing, or beside what is no drift, that explains as much as the best candidate does.
+    Moves are those of the search from the best model and from the one that is told: one more, one in the place of a
+    member, one in the place of two. Kept is also what beside nothing, or beside what is no drift, explains half as much
+    as the best candidate does.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def near(found: Posterior[E], effects: Sequence[Effect], signature: Floats) -> B
     candidates, size = candidate_priors(effects, board.evidence.imu)
     models = list(dict.fromkeys([found.best.members, found.told.members]))
     beside = list(dict.fromkeys([(), *(without_drifts(board, one) for one in models)]))
-    likely = [noise for noise, p in found.noises if p > _LIKELY]
+    likely = [found.best.noise, found.told.noise, *(noise for noise, p in found.noises if p > _LIKELY)]
     best = max(offset + data.at(one).score for offset, data in map(board.data, likely) for one in models)
     prior = _prior(board, candidates)
     on_wander = None if board.wander is None else board.wander.across(W)
@@ -92,7 +93,8 @@ class _More:
         here, first = self.at(members), len(self.place)
         tables = [here.score + here.gains(), *(here.score + table for _, table in here.exchanges())]
         tables += [table for _, table in here.mergers()]
-        return np.asarray(np.max(tables, axis=(0, 2))[first:])
+        # What rounding leaves of a pair that is nearly one is no number, and says nothing.
+        return np.asarray(np.nanmax(tables, axis=(0, 2))[first:])
 
     def begins(self, members: Members, least: float) -> Bools:
         """Whether each candidate beside a model explains as much, as log Bayes factor (1), and is no worse than it."""
@@ -121,10 +123,12 @@ def _beside(
     numbers = sorted({number for one in models for number, _ in one})
     k, p = len(numbers), len(board.evidence.weight)
     one, known = board.in_noise(noise), board.data(noise)[1]
-    own, across, d = board.seen_of(W, np.array([*range(p), *(p + number for number in numbers)]), noise, on_wander)
+    at = np.array([*range(p), *(p + number for number in numbers)], dtype=np.int64)
+    own, across, d = board.seen_of(W, at, noise, on_wander)
     X = solved(one.J[:p, :p] + np.diag(board.evidence.weight), np.column_stack([across[:, :p].T, one.d[:p]]))
     c = own - np.einsum("ik,ki->i", across[:, :p], X[:, :-1])
-    size = np.where(np.isfinite(size), size, UNKNOWN_SIZE / np.sqrt(np.maximum(own, 1e-300)))
+    in_white = np.einsum("ij,ij->j", W, W)
+    size = np.where(np.isfinite(size), size, UNKNOWN_SIZE / np.sqrt(np.maximum(in_white, 1e-300)))
     between = (across[:, p:] - X[:, :-1].T @ one.J[:p, [p + number for number in numbers]]) * board.size[numbers]
     J = np.diag(np.concatenate([np.zeros(k), np.maximum(c, 0.0) * size**2]))
     J[:k, :k] = known.J[np.ix_(numbers, numbers)]
