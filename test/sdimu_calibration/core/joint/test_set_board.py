@@ -11,6 +11,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.joint.rival_noises import rival_noises
 from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
 from sdimu_calibration.core.joint.set_evidence import set_evidence
@@ -39,7 +40,7 @@ def test_noises_of_one_recording_are_as_likely_as_its_own_board_says():
     test = unit_set(35, [short()], noise=WALK).members[0].open()
     fit = solve(test, load_model("baseline"))
     evidence = fit.evidence([resolve(RAMP)])
-    rivals = rival_noises(evidence, fit.noise_terms)
+    rivals = rival_noises(evidence, wander_in(evidence, fit.noise_terms))
     board = Board(evidence, np.empty(0, dtype=np.int64), frozenset(), Wander.of(evidence))
     p = evidence.coefficients
     white = log_likelihood(rivals[0], evidence.weight[:p], p)

@@ -78,7 +78,7 @@ def suspected(fit: NavigationFit) -> bool:
     return chi2_tail(float(means @ means), len(means)) < SUSPECTED_P
 
 
-def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> F:
+def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm], held_out: bool = True) -> F:
     """Estimate the coefficients of a fit again, in noise of these terms; without terms the fit is in white noise.
 
     Parameters
@@ -87,6 +87,8 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
         That navigates.
     evidence : LinearEvidence
         About the fit, in white noise; candidates are not looked at.
+    held_out : bool
+        Predict the stops; without it their error in this noise is NaN.
     """
     if not isinstance(fit, NavigationFit):
         return fit
@@ -98,7 +100,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     deviation, covariance = _with_mean(bare, modes, fit.setup.sensors)
     residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
-    rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms
+    rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms if held_out else float("nan")
     information = Joint.of(bare, wander).on_wander(evidence.model, evidence.weight)
     gain = likelihood(information, wander.cut, terms) - information.fitted
     estimate = NoiseEstimate(

@@ -166,7 +166,7 @@ def fitted(job: Job) -> Fit:
     if job.noise is None:
         return with_noise_learned(fit)
     evidence = fit.bare
-    return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise) if job.noise else fit
+    return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise, held_out=False) if job.noise else fit
 
 
 def _of_all(effects: Sequence[str | Effect], job: Job) -> tuple[str, ...]:
@@ -206,9 +206,10 @@ def _report(job: Job, fit: Fit) -> Report:
         found, places = function_rows(fit, job.function), None
     else:
         evidence = fit.evidence([*shared, *own])
-        found, places = reduced(evidence, fit.noise_terms), None
-        if job.rivals and fit.estimator != HandheldFit.estimator:
-            rivals = rival_noises(evidence, fit.noise_terms)
+        weighed = job.rivals and fit.estimator != HandheldFit.estimator
+        wander = wander_in(evidence, fit.noise_terms) if weighed or fit.noise_terms else None
+        found, places = reduced(evidence, fit.noise_terms, wander), None
+        rivals = rival_noises(evidence, wander) if weighed and wander else ()
     log = recording.temperature
     rows = _named(found, job, shared)
     return Report(

@@ -15,6 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -46,7 +47,7 @@ class Reduction:
     """Sum of squares (1) that no parameter explains."""
 
 
-def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Reduction:
+def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = (), wander: Wander | None = None) -> Reduction:
     """Compress an evidence.
 
     Parameters
@@ -56,11 +57,14 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = ()) -> Redu
         references of the site, which all recordings share.
     terms : tuple of NoiseTerm
         Noise with a memory that was learned in the recording.
+    wander : Wander, optional
+        As of `wander_in` for these terms, where it is known.
     """
     own = len(evidence.weight)
     kept, others = kept_and_others(evidence)
     order, p = np.concatenate([kept, others, np.arange(own, evidence.W.shape[1])]), len(kept)
-    columns = whitened(np.column_stack([evidence.W[:, order], evidence.e]), evidence, terms)
+    columns = np.column_stack([evidence.W[:, order], evidence.e])
+    columns = whitened(columns, wander or wander_in(evidence, terms), terms) if terms else columns
     if own > p:
         columns = _without(columns, p, evidence.weight[others], evidence.shift[others])
     W, e = columns[:, :-1], columns[:, -1]
@@ -118,34 +122,30 @@ def compressed(W: Floats, e: Floats) -> tuple[Floats, Floats]:
 
 
 def _without(columns: Floats, p: int, weight: Floats, shift: Floats) -> Floats:
-    """Eliminate parameters behind the first p, with their priors, from rows ``[W e]`` by QR decomposition."""
+    """Eliminate parameters behind the first p, with their priors, from rows ``[W e]``: what is across their columns."""
     count = len(weight)
     prior = np.zeros((count, columns.shape[1]))
     prior[:, p : p + count] = np.diag(np.sqrt(weight))
     prior[:, -1] = np.sqrt(weight) * shift
-    order = np.concatenate([np.arange(p, p + count), np.arange(p), np.arange(p + count, columns.shape[1])])
-    R = np.asarray(np.linalg.qr(np.vstack([columns, prior])[:, order], mode="r"), dtype=np.float64)
-    return R[count:, count:]
+    every = np.vstack([columns, prior])
+    Q = np.linalg.qr(every[:, p : p + count])[0]
+    rest = np.hstack([every[:, :p], every[:, p + count :]])
+    return np.asarray(rest - Q @ (Q.T @ rest))
 
 
-def whitened(columns: Floats, evidence: LinearEvidence, terms: tuple[NoiseTerm, ...]) -> Floats:
+def whitened(columns: Floats, wander: Wander, terms: tuple[NoiseTerm, ...]) -> Floats:
     """Whiten columns in noise with a memory.
 
     Parameters
     ----------
     columns : ndarray, shape (N, m)
-        In the white noise of the evidence.
-    evidence : LinearEvidence
-        N rows.
+        In white noise.
 
     Returns
     -------
     ndarray, shape (N, m)
         ``S^-1/2 columns``, in the same units; S is the covariance of all noise.
     """
-    if not terms:
-        return columns
-    wander = wander_in(evidence, terms)
     inner = columns if wander.inner is None else wander.inner.whitened(columns)
     return unit_noise(wander.modes(terms).columns, inner)
 
@@ -164,5 +164,8 @@ def unit_noise(modes: Floats, columns: Floats) -> Floats:
     ndarray, shape (N, m)
         In the units of `columns`.
     """
-    U, size, _ = np.linalg.svd(modes, full_matrices=False)
-    return np.asarray(columns - U @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2))[:, None] * (U.T @ columns)))
+    squares, V = np.linalg.eigh(modes.T @ modes)
+    root = np.sqrt(1.0 + np.maximum(squares, 0.0))
+    # 1 - 1/root over the square, without the difference of what is nearly one.
+    share = 1.0 / (root * (1.0 + root))
+    return np.asarray(columns - modes @ (V @ (share[:, None] * (V.T @ (modes.T @ columns)))))

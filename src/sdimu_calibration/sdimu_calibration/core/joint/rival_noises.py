@@ -6,7 +6,7 @@ other recordings of the set tell. So a search in a set weighs the noises of ever
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +14,10 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.joint_information import Joint
+from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded
-from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
-from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import noises_of
@@ -77,17 +76,16 @@ def in_its_noise(reduction: Reduction) -> InOneNoise:
     return InOneNoise(NoiseModel(), names, np.arange(len(names)), A.T @ A, A.T @ y, 0.0, 0.0, squares, reduction.rows)
 
 
-def rival_noises(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> tuple[InOneNoise, ...]:
+def rival_noises(evidence: LinearEvidence, wander: Wander) -> tuple[InOneNoise, ...]:
     """Work out the noises that a recording leaves probable, and what it says in each.
 
     Parameters
     ----------
     evidence : LinearEvidence
         In white noise, with the candidates of the set.
-    terms : sequence of NoiseTerm
-        Noise of its fit: sets the length of the stretches.
+    wander : Wander
+        As of `wander_in` for the noise of its fit, which sets the length of the stretches.
     """
-    wander = wander_in(evidence, terms)
     evidence = evidence.in_inner(wander.inner)
     board = Board(evidence, np.arange(len(evidence.weight), len(evidence.names)), frozenset(), wander)
     noises = [NoiseModel()]
