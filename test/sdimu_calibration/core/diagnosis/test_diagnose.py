@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +56,19 @@ def test_a_hidden_effect_is_named_measured_and_lowers_the_held_out_error(bench):
     assert one.explained > 0.8
     # One class, wherever it is told.
     assert [step.alike for step in diagnosis.found.steps] == [one.alike]
+
+
+def test_a_diagnosis_is_gone_when_nobody_holds_it(bench):
+    fit = bench.fit()
+    gc.collect()
+    gc.disable()
+    try:
+        found = climb(fit)
+        held = [weakref.ref(found.evidence), weakref.ref(found.found.posterior.board), weakref.ref(found.found.white)]
+        del found
+        assert [one() for one in held] == [None] * 3
+    finally:
+        gc.enable()
 
 
 def test_the_free_input_shares_of_what_was_found_sum_to_what_was_explained(bench):

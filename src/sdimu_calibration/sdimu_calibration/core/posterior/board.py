@@ -70,9 +70,15 @@ class Board(Generic[E]):
         self.evidence, self.allowed, self.finer, self.wander = evidence, allowed, finer, wander
         self.joint = None if wander is None else Joint.of(evidence, wander, earlier)
         self.excess = 1.0
-        self.as_stated = self
+        # Not itself: what refers to itself keeps its matrices until somebody looks for such rings.
+        self._stated: Board[E] | None = None
         self._data: dict[NoiseModel, tuple[float, Data]] = {}
         self._in_noise: dict[NoiseModel, InNoise] = {}
+
+    @property
+    def as_stated(self) -> Board[E]:
+        """The board in noise as its models state it."""
+        return self if self._stated is None else self._stated
 
     @property
     def has_noises(self) -> bool:
@@ -94,7 +100,7 @@ class Board(Generic[E]):
         if excess == self.excess:
             return self
         out = copy(self)
-        out.excess, out._data, out._in_noise = excess, {}, {}
+        out.excess, out._data, out._in_noise, out._stated = excess, {}, {}, self.as_stated
         return out
 
     def excess_of(self, members: Members, noise: NoiseModel) -> float:
