@@ -49,7 +49,7 @@ def every(fit):
     return [one for effect in both for one in effect.singles]
 
 
-def test_what_is_kept_is_what_one_or_two_moves_bring_near_the_best_model(fit, every):
+def test_what_is_kept_is_what_a_move_brings_near_the_best_model(fit, every):
     whole = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False)
     wander = Wander.of(whole.evidence)
     found = search(whole.evidence, whole.allowed, wander).posterior

@@ -91,7 +91,8 @@ class _More:
     def moved(self, members: Members) -> Floats:
         """Best log posterior of a model with each candidate, one move away (1); shape (n,)."""
         here, first = self.at(members), len(self.place)
-        tables = [here.score + here.gains(), *(here.score + table for _, table in here.exchanges())]
+        # A size that has the wrong sign in this noise may have the right one beside what comes in.
+        tables = [here.of_any_sign + here.gains(), *(here.of_any_sign + table for _, table in here.exchanges())]
         tables += [table for _, table in here.mergers()]
         # What rounding leaves of a pair that is nearly one is no number, and says nothing.
         return np.asarray(np.nanmax(tables, axis=(0, 2))[first:])
