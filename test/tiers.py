@@ -40,7 +40,10 @@ LONG = {
         "test_static_recordings_are_diagnosed",
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_consumer-1]",
     ),
-    "test/sdimu_calibration/core/posterior/test_near.py": ("test_a_diagnosis_tells_what_it_tells_with_all_of_them",),
+    "test/sdimu_calibration/core/posterior/test_near.py": (
+        "test_a_diagnosis_tells_what_it_tells_with_all_of_them",
+        "test_what_is_kept_is_what_a_move_brings_near_the_best_model",
+    ),
     "test/sdimu_calibration/core/posterior/test_models.py": (
         "test_probabilities_come_true_where_the_world_is_as_the_prior_says",
     ),
