@@ -29,6 +29,8 @@ DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 _LOCK = "sdimu-domain-"
 """Begin of the name of the file that holds a domain, in the folder of temporary files."""
 POLITE_S = 5.0
+_PATIENT_S = 60.0
+"""Longest wait for a node that is stopped by itself (s): on a busy machine its files are closed after more than five."""
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
@@ -260,7 +262,7 @@ class Children:
         """Stop a node with a signal; its exit status."""
         child = self._children.pop(name)
         child.process.send_signal(how)
-        return child.process.wait(POLITE_S)
+        return child.process.wait(_PATIENT_S)
 
     def end(self) -> None:
         """End those still running: SIGINT first, so that files are closed, SIGKILL after five seconds."""
