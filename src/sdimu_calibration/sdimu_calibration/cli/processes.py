@@ -30,7 +30,7 @@ _LOCK = "sdimu-domain-"
 """Begin of the name of the file that holds a domain, in the folder of temporary files."""
 POLITE_S = 5.0
 _PATIENT_S = 60.0
-"""Longest wait for a node that is stopped by itself (s): on a busy machine its files are closed after more than five."""
+"""Longest wait for a node that is stopped by itself (s): on a busy machine closing its files takes long."""
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
