@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from rate_table_sim.core.profile import trapezoid
 from sdimu_calibration.core.arrays import Floats
@@ -147,6 +146,8 @@ def _polynomial(
     if point.acceleration is not None:
         left.append(np.zeros(3) if bend is None else bend)
         right.append(point.acceleration)
+    from scipy.interpolate import BPoly  # noqa: PLC0415 (0.3 s that a table without a trajectory does not need)
+
     curve = BPoly.from_derivatives([begin_s, end_s], [left, right])
     ends = np.array([begin_s, end_s])
     steepest = np.abs(curve(np.concatenate([ends, t]), 2)).max(axis=0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lfilter
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
@@ -29,6 +28,8 @@ class Lag:
 
     def __call__(self, v: Floats) -> Floats:
         """Lagged samples (m,) of the next samples (m,), in the unit of the signal."""
+        from scipy.signal import lfilter  # noqa: PLC0415 (0.8 s that a simulation without a lag does not need)
+
         if not len(v):
             return v
         if self._state is None:
