@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic
@@ -100,7 +100,7 @@ class Posterior(Generic[E]):
     def _families(self) -> dict[tuple[str, str], frozenset[int]]:
         """Candidates of each family that some model holds."""
         out: dict[tuple[str, str], set[int]] = {}
-        for number in np.flatnonzero(self._holds.any(axis=0)).tolist():
+        for number in self.held:
             out.setdefault(family_of(self.candidate(number)), set()).add(number)
         return {family: frozenset(numbers) for family, numbers in out.items()}
 
@@ -123,11 +123,31 @@ class Posterior(Generic[E]):
 
     @cached_property
     def _holds(self) -> Bools:
-        """Whether each model holds each candidate; shape (models, q)."""
-        out = np.zeros((len(self.models), len(self.board.use)), dtype=bool)
-        for row, model in zip(out, self.models, strict=True):
-            row[[number for number, _ in model.members]] = True
-        return out
+        """Whether each model holds each candidate; shape (models, q), each column in one piece of memory."""
+        model = np.repeat(np.arange(len(self.models)), [len(m.members) for m in self.models])
+        out = np.zeros((len(self.board.use), len(self.models)), dtype=bool)
+        out[[number for m in self.models for number, _ in m.members], model] = True
+        return out.T
+
+    @cached_property
+    def held(self) -> list[int]:
+        """Candidates that some model holds, in ascending order."""
+        found: list[int] = np.flatnonzero(self._holds.any(axis=0)).tolist()
+        return found
+
+    def of_each(self, name: Mapping[int, str]) -> dict[str, float]:
+        """Probability that the model holds a candidate of a name, the likeliest first.
+
+        Parameters
+        ----------
+        name : mapping of int to str
+            Of candidates; some may share one.
+        """
+        groups: dict[str, list[int]] = {}
+        for number, one in name.items():
+            groups.setdefault(one, []).append(number)
+        total = {one: self._any_of(numbers) for one, numbers in groups.items()}
+        return dict(sorted(total.items(), key=lambda item: (-item[1], item[0])))
 
     def candidate(self, number: int) -> Candidate:
         """Candidate of a member."""
@@ -327,10 +347,10 @@ def _noises(
 
 
 def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseModel]) -> tuple[Weighed, ...]:
-    best = max(found.values())
-    total = sum(np.exp(score - best) for score in found.values())
     ranked = sorted(found.items(), key=lambda item: (-item[1], item[0]))
-    return tuple(Weighed(m, noises[k], float(np.exp(score - best) / total)) for (k, m), score in ranked)
+    weight = np.exp(np.array([score for _, score in ranked]) - ranked[0][1])
+    share = (weight / weight.sum()).tolist()
+    return tuple(Weighed(m, noises[k], p) for ((k, m), _), p in zip(ranked, share, strict=True))
 
 
 def _climbed(

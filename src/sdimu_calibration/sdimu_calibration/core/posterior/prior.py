@@ -89,6 +89,11 @@ class Prior:
         )
 
     @cached_property
+    def of_one_sign(self) -> frozenset[int]:
+        """Candidates whose size cannot be negative."""
+        return frozenset(np.flatnonzero(self.positive).tolist())
+
+    @cached_property
     def _bins(self) -> int:
         """Number of axes whose drifts are counted, and one for all that is no drift."""
         return int(self.drift.max(initial=-1)) + 2

@@ -6,7 +6,7 @@ registry with any time constant. Which of its members it is may be open while th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.noise_term import AXES, NoiseTerm, sensors_of
 from sdimu_calibration.core.posterior.family import family_of
-from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
+from sdimu_calibration.core.posterior.posterior import Posterior
 
 LEAST = 0.01
 """Probability below which something is not told (1): it is one in a hundred."""
@@ -98,19 +98,17 @@ def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probab
     told : sequence of NoiseTerm
         Noise with its intervals.
     """
-    numbers = sorted({number for model in found.models for number, _ in model.members})
-    family = {k: family_of(found.candidate(k)) for k in numbers}
-    label = {k: found.candidate(k).label for k in numbers}
-    of_label = _summed(found, lambda m: (label[k] for k, _ in m.members))
-    of_family = _summed(found, lambda m: ("/".join(family[k]) for k, _ in m.members))
+    family = {k: "/".join(family_of(found.candidate(k))) for k in found.held}
+    label = {k: found.candidate(k).label for k in found.held}
+    of_label, of_family = found.of_each(label), found.of_each(family)
     members: dict[str, list[MemberShare]] = {}
     sizes = _sizes(found)
-    for k in numbers:
+    for k in found.held:
         share = of_label[label[k]]
         if share >= LEAST:
             p = found.candidate(k).parameter
             one = MemberShare(label[k], share, *sizes.get(k, (np.nan, np.nan)), p.unit, p.display_unit)
-            members.setdefault("/".join(family[k]), []).append(one)
+            members.setdefault(family[k], []).append(one)
     families = []
     for name, share in of_family.items():
         if share >= LEAST:
@@ -122,27 +120,17 @@ def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probab
 
 def of_coefficients(found: Posterior[E]) -> tuple[Share, ...]:
     """Probability of each coefficient of an effect, with any time constant; those of less than `LEAST` are left out."""
-    name = {k: found.candidate(k).coefficient for m in found.models for k, _ in m.members}
-    return _shares(_summed(found, lambda m: (name[k] for k, _ in m.members)))
+    return _shares(found.of_each({k: found.candidate(k).coefficient for k in found.held}))
 
 
 def may_be(found: Posterior[E], place: int) -> tuple[Share, ...]:
     """Say what a member of the told model may be: each coefficient of its class, the likeliest first."""
     names = {k: found.candidate(k).coefficient for k in (found.told.members[place][0], *found.classes[place])}
-    return _shares(_summed(found, lambda m: (names[k] for k, _ in m.members if k in names)))
+    return _shares(found.of_each(names))
 
 
 def _shares(total: dict[str, float]) -> tuple[Share, ...]:
     return tuple(Share(name, p) for name, p in total.items() if p >= LEAST)
-
-
-def _summed(found: Posterior[E], names: Callable[[Weighed], Iterable[str]]) -> dict[str, float]:
-    """Probability of the models that have each name, the likeliest first."""
-    total: dict[str, float] = {}
-    for model in found.models:
-        for name in set(names(model)):
-            total[name] = min(total.get(name, 0.0) + model.probability, 1.0)
-    return dict(sorted(total.items(), key=lambda item: (-item[1], item[0])))
 
 
 def _sizes(found: Posterior[E]) -> dict[int, tuple[float, float]]:
