@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mutants import CORE, MUTANTS
 from sharing import APART, DOMAINS_A_RUN, LONGEST, TOGETHER, scope_of
-from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, is_thorough, names
+from tiers import COLLECTED, LONG, QUICK_ROS, THOROUGH, VARIANTS, is_thorough, names
 
 from sdimu_calibration.cli.processes import DOMAINS, STATED
 
@@ -22,7 +22,7 @@ def collected(request: pytest.FixtureRequest) -> list[str]:
     """Names of all tests in the files and folders of the table, as pytest prints them: of this run, if it is whole."""
     if {Path(name).resolve() for name in request.config.args} & {ROOT, ROOT / "test"}:
         return request.config.stash[COLLECTED]
-    files = sorted({row.partition("::")[0] for row in (*THOROUGH, *LONG, *QUICK_ROS)})
+    files = sorted({row.partition("::")[0] for row in (*THOROUGH, *LONG, *VARIANTS, *QUICK_ROS)})
     command = [sys.executable, "-m", "pytest", "--collect-only", "-p", "no:xdist", "-p", "no:warnings", *files]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -30,7 +30,7 @@ def collected(request: pytest.FixtureRequest) -> list[str]:
 
 
 def test_every_row_of_the_table_names_a_test(collected):
-    single = [f"{file}::{name}" for file, rows in LONG.items() for name in rows]
+    single = [f"{file}::{name}" for rows in (LONG, VARIANTS) for file, own in rows.items() for name in own]
     table = (*THOROUGH, *LONG, *single, *QUICK_ROS)
     assert not [row for row in table if not any(names(row, test) for test in collected)]
 

@@ -209,6 +209,7 @@ LONG = {
         "test_an_npz_unpacks_to_what_it_may",
     ),
     "test/sdimu_calibration/core/joint/test_set_fit.py": (
+        "test_a_coefficient_that_changed_in_one_recording_is_pointed_out",
         "test_a_coefficient_that_follows_the_date_is_told",
         "test_recordings_that_say_no_time_keep_their_order_in_tables_alone",
         "test_a_clean_set_scatters_as_chance_does",
@@ -291,6 +292,7 @@ LONG = {
         "test_the_diagnosis_names_an_effect_of_the_temperature_rate",
     ),
     "test/sdimu_calibration/core/second_order/test_bend.py": (
+        "test_a_plan_that_shows_everything_makes_no_pass_for_it",
         "test_noise_of_next_to_no_size_moves_nothing_that_the_prior_decides",
     ),
     "test/sdimu_calibration/core/posterior/test_search_again.py": (
@@ -300,9 +302,70 @@ LONG = {
         "test_a_ramp_gives_the_axes_of_every_temperature[mems_industrial-batch]",
     ),
     "test/recovery/test_recovery.py": ("test_whole_plan_recovers_the_coefficients_within_their_covariance",),
+    "test/sdimu_calibration/core/joint/test_same_unit.py": ("test_a_set_says_that_its_axes_are_not_told",),
+    "test/sdimu_calibration/core/diagnosis/test_traps.py": (
+        "test_regressors_of_measured_motion_make_a_dead_band_of_noise",
+    ),
 }
-"""Single tests of 4 s and more of a processor, where others of their file hold the claims of `make test`; an empty
+"""Single tests of 2.5 s and more of a processor, where others of their file hold the claims of `make test`; an empty
 row is the whole file."""
+
+VARIANTS = {
+    "test/sdimu_calibration/core/batch/test_batch.py": ("test_responses_of_a_motion_are_its_derivatives[0.0]",),
+    "test/sdimu_calibration/core/batch/test_classical.py": ("test_a_mount_passes_for_misalignment_and_scale[1.0]",),
+    "test/sdimu_calibration/core/estimation/test_axes_by_temperature.py": (
+        "test_a_ramp_gives_the_axes_of_every_temperature[mems_industrial-second-order]",
+    ),
+    "test/sdimu_calibration/core/estimation/test_every_estimator.py": (
+        "test_a_fit_is_diagnosed_and_shown[dtg batch]",
+        "test_a_fit_is_diagnosed_and_shown[mems_industrial second-order]",
+        "test_the_estimator_does_not_hang_on_how_noise_cuts_the_rests[kim18-50001]",
+    ),
+    "test/sdimu_calibration/core/estimation/test_free_azimuth.py": (
+        "test_an_azimuth_that_the_site_states_counts_where_it_is_known_well_enough[3.0-False]",
+        "test_the_answer_is_the_same_for_every_azimuth_that_is_assumed[90.0]",
+        "test_the_answer_is_the_same_for_every_azimuth_that_is_assumed[270.0]",
+        "test_white_noise_leaves_as_much_of_the_azimuth_as_the_mean_rates_do[recommended]",
+    ),
+    "test/sdimu_calibration/core/estimation/test_stated_priors.py": (
+        "test_a_stated_prior_conditions_the_fit_of_the_other_coefficients[gyro_scale_y-second-order-0.0]",
+    ),
+    "test/sdimu_calibration/core/evidence/test_learned_noise.py": (
+        "test_noise_far_above_white_noise_keeps_its_name[random_walk]",
+    ),
+    "test/sdimu_calibration/core/joint/test_changed.py": (
+        "test_a_coefficient_that_changed_is_told_as_such_and_not_as_physics_that_looks_like_it[accel_scale_x-4e-05]",
+    ),
+    "test/sdimu_calibration/core/joint/test_recurrence.py": (
+        "test_what_is_of_each_recording_does_not_come_back[scatter]",
+        "test_what_is_of_each_recording_does_not_come_back[time]",
+    ),
+    "test/sdimu_calibration/core/joint/test_static_sets.py": (
+        "test_noise_that_moves_within_the_only_rest_of_a_recording_is_no_warm_up[mems_consumer-210010-turns1-None]",
+        "test_up_and_down_are_a_set_whatever_their_order_and_names[fog_tactical-1]",
+        "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_by_hand-1]",
+        "test_up_and_down_are_a_set_whatever_their_order_and_names[rlg_navigation-1]",
+    ),
+    "test/sdimu_calibration/core/second_order/test_seen_about_the_cycle.py": (
+        "test_the_true_model_gives_an_effect_of_the_temperature_rate_its_size[2]",
+        "test_the_true_model_gives_an_effect_of_the_temperature_rate_its_size[3]",
+    ),
+    "test/sdimu_calibration/core/test_live_end.py": (
+        "test_live_end_and_bag_give_the_same_coefficients[dtg-cases2]",
+        "test_live_end_and_bag_give_the_same_coefficients[fog_tactical-cases1]",
+        "test_live_end_and_bag_give_the_same_coefficients[rlg_navigation-cases3]",
+    ),
+    "test/sdimu_calibration/storage/test_matlab_objects.py": (
+        "test_a_map_is_proposed_with_the_units_that_the_table_states[v7]",
+        "test_a_table_beside_numbers_and_structures_is_read[v7]",
+        "test_a_timetable_of_dates_keeps_its_nanoseconds_and_all_columns_of_a_matrix[v7]",
+        "test_durations_and_even_times_of_rows_are_seconds[durations-v7]",
+        "test_durations_and_even_times_of_rows_are_seconds[step-v7]",
+    ),
+    "test/recovery/test_recovery.py": ("test_recovery_does_not_need_axes_along_north_east_down[mount0]",),
+}
+"""Variants of a test of half a second and more of which `make test` keeps another one, or a shorter test of the same
+claim."""
 
 QUICK_ROS = (
     "test/ros/test_whole_run.py::test_a_run_loses_nothing",
@@ -330,7 +393,9 @@ def is_thorough(name: str, over_dds: bool) -> bool:
     if any(names(row, name) for row in THOROUGH):
         return True
     file, _, test = name.partition("::")
-    return file in LONG and (not LONG[file] or any(names(row, test) for row in LONG[file]))
+    if file in LONG and not LONG[file]:
+        return True
+    return any(names(row, test) for row in (*LONG.get(file, ()), *VARIANTS.get(file, ())))
 
 
 def names(row: str, test: str) -> bool:
