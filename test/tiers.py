@@ -67,6 +67,7 @@ LONG = {
         "test_words_for_estimators_and_models_are_those_of_the_shell",
     ),
     "test/sdimu_calibration/api/test_recording_set.py": (
+        "test_what_cannot_be_used_is_one_line",
         "test_files_are_those_of_the_verbs",
         "test_a_diagnosis_of_a_set_says_what_is_known_and_what_to_record",
         "test_a_joint_fit_is_a_table_with_units",
@@ -129,6 +130,7 @@ LONG = {
         "test_an_effect_that_is_not_to_be_tried_is_not_named_and_something_is_missing_all_the_same",
     ),
     "test/sdimu_calibration/core/diagnosis/test_handheld_diagnosis.py": (
+        "test_an_effect_that_nothing_bounds_and_nothing_shows_has_no_signature",
         "test_a_right_model_is_left_alone",
         "test_a_turn_shows_what_acts_only_in_turns",
         "test_two_that_stood_for_one_in_the_scatter_give_way_to_it",
@@ -143,6 +145,7 @@ LONG = {
         "test_a_weaker_effect_beside_strong_ones_is_named_and_nothing_without_a_cause",
     ),
     "test/sdimu_calibration/core/estimation/test_every_estimator.py": (
+        "test_a_fit_answers_every_question[mems_industrial second-order]",
         "test_a_fit_answers_every_question[mems_industrial batch]",
         "test_a_result_is_written_read_compensated_and_exported[mems_industrial batch]",
         "test_a_result_is_written_read_compensated_and_exported[mems_industrial second-order]",
@@ -153,6 +156,7 @@ LONG = {
         "test_a_fit_is_diagnosed_and_shown[mems_industrial batch]",
     ),
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py": (
+        "test_an_azimuth_that_the_site_states_counts_where_it_is_known_well_enough[60.0-True]",
         "test_a_filter_that_loses_the_azimuth_gives_way_to_passes_that_do_without_one",
         "test_a_navigation_without_aid_drifts_as_promised_in_the_noise_that_was_learned",
         "test_a_set_takes_each_recording_without_its_azimuth",
@@ -209,6 +213,8 @@ LONG = {
         "test_an_npz_unpacks_to_what_it_may",
     ),
     "test/sdimu_calibration/core/joint/test_set_fit.py": (
+        "test_more_recordings_know_more",
+        "test_a_recording_has_its_own_value_of_an_effect_that_all_have",
         "test_a_coefficient_that_changed_in_one_recording_is_pointed_out",
         "test_a_coefficient_that_follows_the_date_is_told",
         "test_recordings_that_say_no_time_keep_their_order_in_tables_alone",
@@ -292,6 +298,8 @@ LONG = {
         "test_the_diagnosis_names_an_effect_of_the_temperature_rate",
     ),
     "test/sdimu_calibration/core/second_order/test_bend.py": (
+        "test_scale_factors_have_the_half_square_of_the_angle_in_their_sigma",
+        "test_passes_end_where_data_and_the_turned_prior_balance",
         "test_a_plan_that_shows_everything_makes_no_pass_for_it",
         "test_noise_of_next_to_no_size_moves_nothing_that_the_prior_decides",
     ),
@@ -304,7 +312,17 @@ LONG = {
     "test/recovery/test_recovery.py": ("test_whole_plan_recovers_the_coefficients_within_their_covariance",),
     "test/sdimu_calibration/core/joint/test_same_unit.py": ("test_a_set_says_that_its_axes_are_not_told",),
     "test/sdimu_calibration/core/diagnosis/test_traps.py": (
+        "test_a_filter_that_forgets_shared_noise_inflates_the_scores_of_gyro_drifts",
         "test_regressors_of_measured_motion_make_a_dead_band_of_noise",
+    ),
+    "test/sdimu_calibration/core/estimation/test_stated_priors.py": (
+        "test_a_stated_prior_conditions_the_fit_of_the_other_coefficients[gyro_misalignment_yz-second-order-0.5]",
+    ),
+    "test/sdimu_calibration/core/data/test_resting_cycles.py": (
+        "test_a_test_taken_for_a_long_one_gives_the_same_estimate",
+    ),
+    "test/sdimu_calibration/core/handheld/test_whole_turns.py": (
+        "test_whole_turns_that_are_stated_give_the_scale_factors_of_the_gyros",
     ),
 }
 """Single tests of 2.5 s and more of a processor, where others of their file hold the claims of `make test`; an empty
