@@ -299,7 +299,6 @@ LONG = {
     ),
     "test/sdimu_calibration/core/second_order/test_bend.py": (
         "test_scale_factors_have_the_half_square_of_the_angle_in_their_sigma",
-        "test_passes_end_where_data_and_the_turned_prior_balance",
         "test_a_plan_that_shows_everything_makes_no_pass_for_it",
         "test_noise_of_next_to_no_size_moves_nothing_that_the_prior_decides",
     ),
