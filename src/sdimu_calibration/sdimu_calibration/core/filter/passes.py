@@ -328,11 +328,16 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
     held = held_back(sensors.weight, estimate, covariance) & ~gauge & ~sensors.restated
     if not held.any():
         return sensors
-    return replace(sensors, prior=np.where(held, ROOM * np.abs(estimate), sensors.prior))
+    free = without_prior(sensors.weight, estimate, covariance)
+    return replace(sensors, prior=np.where(held, ROOM * np.abs(free), sensors.prior))
 
 
 def held_back(weight: Floats, estimate: Floats, covariance: Floats) -> Bools:
-    """Tell the coefficients that are far beyond their prior and that it holds back.
+    """Tell the coefficients whose data are far beyond their prior, and that it holds back.
+
+    The prior p and what the data say by themselves d differ by ``d / sqrt(sigma_d^2 + sigma_p^2)`` sigmas, which of an
+    estimate x of variance v is ``x / (sigma_p sqrt(1 - v / sigma_p^2))``: where the data know less than the prior, the
+    estimate stays near it however far they are.
 
     Parameters
     ----------
@@ -345,12 +350,39 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats) -> Bools:
     -------
     ndarray of bool, shape (p,)
     """
-    size, sigma = np.abs(estimate), np.sqrt(np.diag(covariance))
-    return np.asarray((size * np.sqrt(weight) > _BEYOND) & (size * sigma * weight > _PULL))
+    size, variance = np.abs(estimate), np.diag(covariance)
+    beyond = size * np.sqrt(weight) > _BEYOND * np.sqrt(_of_data(weight, variance))
+    return np.asarray(beyond & (size * np.sqrt(variance) * weight > _PULL))
+
+
+def without_prior(weight: Floats, estimate: Floats, covariance: Floats) -> Floats:
+    """Give each coefficient as the data say it without its own prior.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (p,)
+        Prior information (1/SI^2).
+    estimate, covariance : ndarray, shapes (p,) and (p, p)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        SI.
+    """
+    return np.asarray(estimate / _of_data(weight, np.diag(covariance)))
+
+
+def _of_data(weight: Floats, variance: Floats) -> Floats:
+    """Share of the information on each coefficient (1) that is of the data and not of its prior, shape (p,)."""
+    return np.asarray(np.maximum(1.0 - weight * variance, _LEAST_SHARE))
 
 
 _BEYOND = 3.0
-"""Size of an estimate (sigma of its prior) from which it contradicts the prior: chance ends there."""
+"""Distance of the data from the prior (sigma of both) from which they contradict it: chance ends there."""
+_LEAST_SHARE = 1e-3
+"""Share of the information on a coefficient (1) that data have at least: less is a difference of nearly equal
+numbers."""
 _PULL = 0.1
 """Shift of an estimate by its prior (sigma of the estimate) from which the passes are repeated: less is not seen."""
 ROOM = 10.0

@@ -1,0 +1,35 @@
+"""Priors that the data contradict, also where the data know less than the prior."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.filter.passes import held_back, without_prior
+
+
+def estimated(data, sigma, prior):
+    """Prior information, estimate and covariance of scalars that data of a sigma say, each with its prior."""
+    weight, known = prior**-2.0, sigma**-2.0
+    return weight, data * known / (known + weight), np.diag(1.0 / (known + weight))
+
+
+@pytest.mark.parametrize("sigma", [0.001, 0.3, 3.0])
+def test_a_prior_is_contradicted_by_the_distance_of_the_data_whatever_they_know(sigma):
+    prior = np.full(2, 0.1)
+    limit = 3.0 * np.hypot(sigma, prior[0])
+    weight, estimate, covariance = estimated(np.array([0.95 * limit, 1.05 * limit]), np.full(2, sigma), prior)
+    held = held_back(weight, estimate, covariance)
+    # Of data a hundred times as good as the prior nothing is held back, wherever they are.
+    assert held.tolist() == [False, sigma > 0.01]
+
+
+def test_without_its_prior_a_coefficient_is_what_the_data_say():
+    data, sigma = np.array([2.0, -0.3]), np.array([0.35, 0.02])
+    assert without_prior(*estimated(data, sigma, np.full(2, 0.1))) == pytest.approx(data)
+
+
+def test_what_the_data_do_not_show_contradicts_nothing():
+    weight = np.full(1, 4.0)
+    assert not held_back(weight, np.zeros(1), np.diag(1.0 / weight)).any()
+    assert np.isfinite(without_prior(weight, np.zeros(1), np.diag(1.0 / weight))).all()
