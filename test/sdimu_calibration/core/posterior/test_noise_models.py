@@ -92,3 +92,29 @@ def test_what_is_told_of_a_triad_does_not_hang_on_the_noise_of_the_other(cut, us
             for term in TRIED:
                 if term.triad == triad:
                     assert both[triad, term.kind] == pytest.approx(alone[triad, term.kind], abs=0.04)
+
+
+def seen_through_gyros(rng, cut, usual):
+    """Shifts of the accelerometers beside flicker of the gyros thirty times white noise, which tilts what they see."""
+    n = len(cut)
+    level = [usual.centre[triad, FLICKER] for triad in TRIADS]
+    sizes = [30.0 * level[0], 3.0 * usual.centre["accel", SHIFT]]
+    roots = [np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(n)) for kind in (FLICKER, SHIFT)]
+    tilts = 0.3 * level[1] / level[0] * rng.choice([-1.0, 1.0], (n, 1)) * np.tril(np.ones((n, n))) / n
+    H = np.block([[np.eye(n) / level[0], np.zeros((n, n))], [tilts / level[1], np.eye(n) / level[1]]]) / 0.5
+    J, d = np.zeros((n, 2, 3, n, 2, 3)), np.zeros((n, 2, 3))
+    for axis in range(3):
+        error = [size * root @ rng.standard_normal(n) for size, root in zip(sizes, roots, strict=True)]
+        y = H @ np.concatenate(error) + rng.standard_normal(2 * n)
+        d[:, :, axis] = (H.T @ y).reshape(2, n).T
+        J[:, :, axis, :, :, axis] = (H.T @ H).reshape(2, n, 2, n).transpose(1, 0, 3, 2)
+    return NoiseInformation(J.reshape(6 * n, 6 * n), d.ravel(), 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_one_triad_is_found_beside_strong_noise_of_the_other(cut, usual, seed):
+    """By itself the other kinds explain hundreds of what the strong noise does: beside it they do not."""
+    information = seen_through_gyros(np.random.default_rng(seed), cut, usual)
+    found = told(information, cut, usual)
+    assert found["gyro", FLICKER] > 0.9
+    assert found["accel", SHIFT] > 0.5

@@ -68,9 +68,11 @@ _NEAR = 6.0
 """Log posterior (1) behind the best noise up to which another one is kept: effects beside it may change that much."""
 _MOST = 40
 """Number of noises that are kept at most: with eight kinds of each triad, those behind weigh a thousandth together."""
-_HOPELESS = 12.0
-"""Log posterior (1) behind the best term of a triad alone from which a term is not tried again beside noise of the
-other triad: that changes little of it."""
+_SWEEPS, _SETTLED = 4, 0.1
+"""Number of times at most that terms take their sizes in turn, and the gain of log posterior (1) that ends it: no
+probability changes by more than a tenth."""
+_BETTER = 4
+"""Number of times at most that another term takes the place of one of the best noise: two were enough in a campaign."""
 _SHARES = (0.3, 0.7)
 """Share (1) of what effects explain that one term, and two terms, must explain for more to be looked for: a third adds
 less than the second."""
@@ -195,7 +197,7 @@ class _Search:
         room = []
         for term in self.tried:
             own = _of_triad(NoiseModel(terms), term.triad)
-            if len(own) < _MOST_TERMS and not _is_in(term, own) and not (terms and not own and self._hopeless(term)):
+            if len(own) < _MOST_TERMS and not _is_in(term, own):
                 room.append(term)
         given = given_terms(
             self.information, self.cut, terms, [name for name in TRIADS if any(t.triad == name for t in room)]
@@ -222,14 +224,6 @@ class _Search:
             elif len(term.axes) == 1:
                 without.update(term.axes)
         return out
-
-    def _hopeless(self, term: NoiseTerm) -> bool:
-        """Whether a term was far behind the best one of its triad alone: the other triad changes little of that."""
-        alone = [(next(iter(kinds)), found.score) for kinds, found in self.seen.items() if len(kinds) == 1]
-        of_triad = [(known, score) for known, score in alone if known[0] == term.triad]
-        # In any sensors: which of them have it shows beside noise of the other triad.
-        own = max((score for known, score in of_triad if known[:3] == term.identity[:3]), default=-np.inf)
-        return own < max((score for _, score in of_triad), default=-np.inf) - _HOPELESS
 
     def sized(self, modes: InModes, term: NoiseTerm) -> tuple[NoiseTerm, float] | None:
         """Best size of a term, and the log of its odds with the share of the sizes that the likelihood leaves."""
@@ -263,7 +257,20 @@ class _Search:
             self.keep(_Found(NoiseModel(terms, log_prior), one.gain + other.gain - best.gain))
 
     def settled(self, terms: Sequence[NoiseTerm]) -> _Found:
-        """Find the sizes of several terms together, each in turn; what is no longer seen is left out."""
+        """Find the sizes of several terms together, each in turn until they stand; leave out what is no longer seen."""
+        found = self._sized_in_turn(terms)
+        for _ in range(_SWEEPS - 1):
+            if len(found.noise.terms) < 2:
+                break
+            again = self._sized_in_turn(found.noise.terms)
+            stands = again.score < found.score + _SETTLED
+            found = max(found, again, key=lambda one: one.score)
+            if stands:
+                break
+        return self.keep(found)
+
+    def _sized_in_turn(self, terms: Sequence[NoiseTerm]) -> _Found:
+        """Take the best size of each term beside the others, once."""
         sized: dict[int, tuple[NoiseTerm, float]] = {k: (term, 0.0) for k, term in enumerate(terms)}
         for place in list(sized):
             others = [found[0] for k, found in sized.items() if k != place]
@@ -276,7 +283,11 @@ class _Search:
                 sized[place] = again
         noise = NoiseModel(tuple(found[0] for found in sized.values()), sum(found[1] for found in sized.values()))
         gain = noise.terms[0].gain if len(noise.terms) == 1 else self._likelihood(noise)
-        return self.keep(_Found(noise, gain))
+        return _Found(noise, gain)
+
+    def best(self) -> _Found:
+        """Give the likeliest noise so far."""
+        return max(self.seen.values(), key=lambda found: found.score)
 
     def _likelihood(self, noise: NoiseModel) -> float:
         return likelihood(self.information, self.cut, noise.terms) - self.information.fitted
@@ -320,9 +331,9 @@ def explored(
     """
     search = _Search(information, cut, usual, tried)
     best = search.keep(_Found(NoiseModel(), 0.0))
-    for share in chain(_SHARES, repeat(1.0)):
+    for share in chain(_SHARES, repeat(1.0, _MOST_TERMS * len(TRIADS))):
         option = max(search.one_more(best), key=lambda found: found.score, default=best)
-        if not option.score > best.score:
+        if not option.score > best.score + _SETTLED:
             break
         if option.score < share * rival - _BEHIND:
             return []
@@ -331,9 +342,13 @@ def explored(
             if len(option.noise.terms) < 2
             else max(search.settled(option.noise.terms), option, key=lambda found: found.score)
         )
-    for place in range(len(best.noise.terms)):
-        if len(best.noise.terms) > 1:
-            search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
-    search.crossed(max(search.seen.values(), key=lambda found: found.score))
+    for _ in range(_BETTER):
+        for place in range(len(best.noise.terms)):
+            if len(best.noise.terms) > 1:
+                search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
+        if not search.best().score > best.score + _SETTLED:
+            break
+        best = search.settled(search.best().noise.terms)
+    search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
     return [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
