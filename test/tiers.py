@@ -32,6 +32,7 @@ LONG = {
         "test_scale_factors_of_the_accelerometers_that_differ_alike_are_those_of_another_site",
         "test_a_coefficient_that_changed_is_told_as_such_and_not_as_physics_that_looks_like_it[gyro_misalignment_xy-2e-05]",
         "test_of_two_recordings_the_difference_is_told_and_not_which_of_them_changed[0]",
+        "test_an_effect_of_one_recording_is_told_of_none_of_the_others",
     ),
     "test/sdimu_calibration/core/joint/test_function_fit.py": (
         "test_it_changes_next_to_nothing_where_nothing_is_left",

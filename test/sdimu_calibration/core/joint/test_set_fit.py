@@ -247,3 +247,11 @@ def test_recordings_that_say_no_time_keep_their_order_in_tables_alone(options):
     assert [r.name for r in results[0].of_set.recordings] == ["r0", "r1", "r2"]
     assert [r.name for r in results[1].of_set.recordings] == ["r2", "r1", "r0"]
     assert not any(t.covariate in {"order", "date (d)"} for t in results[0].of_set.trends)
+
+
+def test_what_noise_of_a_recording_takes_in_is_judged_as_in_a_recording_by_itself(options):
+    """In white noise the stops show what the NIS does not: 14 ppm of asymmetry."""
+    result = set_outcome(fit_set(unit_set(9, [short()] * 2, ("gyro_scale_asymmetry_x=14 ppm",)).members, options, here))
+    (told,) = [line for line in result.warnings if "does not fit" in line]
+    assert "r0: NIS 1." in told
+    assert "held-out error 1." in told

@@ -29,7 +29,7 @@ from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
 from sdimu_calibration.core.joint.shared_function import SharedFunction, function_rows
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
@@ -225,7 +225,7 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.timetable,
         float("nan") if log is None or not len(log.t) else float(np.mean(log.value)),
         fit.data_counts(),
-        fit.statistics(),
+        _statistics(fit, job),
         fit.names,
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
@@ -238,6 +238,13 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.test.site,
         tuple(replace(one, names=(*rows.names, *rows.labels)) for one in rivals),
     )
+
+
+def _statistics(fit: Fit, job: Job) -> FitStatistics:
+    """State how well the recording is fitted; where its noise may be a missing effect, how well without that, too."""
+    white = fit.statistics()
+    looked_at = not (job.candidates or job.stretches or job.function)
+    return replace(white, held_out_rms=fit.held_out_rms()) if looked_at and may_be_an_effect(fit.noise_terms) else white
 
 
 def _heading(fit: Fit) -> float:

@@ -111,7 +111,9 @@ def diagnose_set(
         again = recurrence(leftovers(found.after, run))
         # What was found is taken back, and something is missing all the same: the verdict stays.
         facts = SetFacts(_findings(found), after, found.after, again, None)
-    asked = again is not None and (not again.answer or ATTITUDE in again.answer)
+    # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
+    open_ones = again is not None and not again.answer and ATTITUDE not in again.told
+    asked = again is not None and (open_ones or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)

@@ -19,6 +19,7 @@ from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
+from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.posterior.posterior import Posterior
@@ -224,20 +225,31 @@ def _beyond(fit: SetFit, base: Fit) -> list[str]:
 
 
 def _misfit(fit: SetFit) -> list[Note]:
-    """Name the recordings whose innovations are larger than white noise makes them, the worst first."""
-    nis = {r.name: r.statistics.nis_mean for r in fit.reports}
-    bad = sorted((name for name, value in nis.items() if value > MISFIT), key=lambda name: -nis[name])
+    """Name the recordings that the model does not fit, as a recording by itself is judged, the worst first."""
+    worst = {r.name: worst_figure(r) for r in fit.reports}
+    bad = sorted((r for r in fit.reports if worst[r.name] > MISFIT), key=lambda r: -worst[r.name])
     if not bad:
         return []
-    told = ", ".join(f"{name} {nis[name]:.3g}" for name in bad[:_LISTED]) + (" and others" if bad[_LISTED:] else "")
+    told = "; ".join(f"{r.name}: {_figures(r)}" for r in bad[:_LISTED]) + ("; others" if bad[_LISTED:] else "")
     return [
         Note(
-            f"the model in white noise does not fit (NIS of {told}; 1 is right): physics is missing, or the noise has "
+            f"the model in white noise does not fit ({told}; 1 is right): physics is missing, or the noise has "
             "a memory",
             Topic.MISFIT,
             f"; run: {Work.DIAGNOSE}",
         )
     ]
+
+
+def worst_figure(report: Report) -> float:
+    """Give the worse of NIS and held-out error (1), as a recording by itself is judged: above `MISFIT` no fit."""
+    figures = report.statistics.judged(may_be_an_effect(report.noise))
+    return max(x for x in figures if x is not None and not np.isnan(x))
+
+
+def _figures(report: Report) -> str:
+    held_out = report.statistics.held_out_rms
+    return f"NIS {report.statistics.nis_mean:.3g}" + ("" if held_out is None else f", held-out error {held_out:.3g}")
 
 
 def _summary(fit: SetFit, varied: Variation, names: Sequence[str], base: Fit) -> SetSummary:

@@ -11,13 +11,15 @@ from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
 from sdimu_calibration.core.diagnosis.found import DECIDED
 from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, in_grades, named, size, without_variant
 from sdimu_calibration.core.diagnosis.verdict import Facts, nothing_missing, something_missing, verdict
+from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit
-from sdimu_calibration.core.joint.set_result import SCATTERS
+from sdimu_calibration.core.joint.set_result import SCATTERS, worst_figure
+from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.results import Calibration
@@ -81,6 +83,12 @@ class SetFacts:
         return self.fit.function is not None
 
     @property
+    def is_of_some(self) -> bool:
+        """Whether some recordings have large errors that noise of theirs takes in, and others have no such noise."""
+        loud = [may_be_an_effect(r.noise) and worst_figure(r) > MISFIT for r in self.fit.reports]
+        return any(loud) and any(not r.noise for r in self.fit.reports)
+
+    @property
     def comes_back(self) -> bool:
         """Whether what is left comes back: it is no noise then, whatever each recording took it for."""
         return self.again is not None and len(self.again.answer) > 0
@@ -91,7 +99,7 @@ def verdict_of_set(facts: SetFacts) -> Verdict:
     findings, error = facts.findings, facts.after.fit["held_out_rms"]
     shared = [(f.label, f.alike) for f in findings if not f.recording]
     still = error is not None and error > STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
-    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back
+    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back or facts.is_of_some
     # A fault leaves traces in its recording that are no physics of the unit.
     unexplained = facts.beside_function or (left and (bool(shared) or not findings))
     # A search that came to no end, or whose finds were taken back, says that something is missing.
