@@ -173,3 +173,22 @@ def test_words_for_estimators_and_models_are_those_of_the_shell(bag):
         assert sdimu.calibrate(opened, model=model, estimator="hand").core.model == given.core.model
     with pytest.raises(DataError, match="estimator by_hand: expected one of auto, filter"):
         sdimu.calibrate(opened, estimator="by_hand")
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: sdimu.plan("kim18", minutes=-3.0), "minutes=-3: a plan takes more than 0 minutes"),
+        (lambda: sdimu.plan("kim18", slack=-1.0), "expected numbers above 0"),
+        (lambda: sdimu.open_set([]), "no bag is named"),
+        (lambda: sdimu.open("bag", imu=7), r"open\(imu=...\): expected a name in config/imu"),
+    ],
+)
+def test_arguments_that_mean_nothing_are_refused_in_one_line(call, said):
+    with pytest.raises(DataError, match=said):
+        call()
+
+
+def test_one_effect_is_added_at_a_time(fit):
+    with pytest.raises(DataError, match=r"add\(effect=...\): expected one effect"):
+        fit.add(["accel_quadratic"])

@@ -109,3 +109,14 @@ def test_the_truth_of_a_bag_that_is_gone_may_go(run, tmp_path):
     shutil.rmtree(tmp_path / "bag")
     assert run("--rate", "20", "--seed", "5").exit_code == 0
     assert read_truth(tmp_path / "bag.truth.yaml").seed == 5
+
+
+@pytest.mark.parametrize(
+    "given", [("--plan", "kim18_signed"), ("--temperature", "cycle"), ("--mount", "1,2,3"), ("--table", "two_axis")]
+)
+def test_what_belongs_to_a_table_is_refused_of_a_run_by_hand(given, tmp_path):
+    app = typer.Typer()
+    app.command()(simulate)
+    with pytest.raises(DataError, match=rf"{given[0]}: a run by hand \(--by-hand\) does not take it"):
+        CliRunner().invoke(app, ["--out", str(tmp_path / "bag"), "--by-hand", "3", *given], catch_exceptions=False)
+    assert not (tmp_path / "bag").exists()

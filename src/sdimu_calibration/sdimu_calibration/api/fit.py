@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +16,8 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.storage.bags.file_room import results_folder
@@ -24,9 +25,6 @@ from sdimu_calibration.storage.files.effect_file import find_effects, new_parts
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
-
-if TYPE_CHECKING:
-    from sdimu_calibration.core.evidence.candidate import Candidate
 
 
 class CalibrationFit(Fitted):
@@ -87,6 +85,8 @@ class CalibrationFit(Fitted):
         effect : str, Effect or Candidate
             As `--add` takes it, or what a diagnosis found.
         """
+        if not isinstance(effect, str | Effect | Candidate):
+            raise DataError(f"add(effect=...): expected one effect, as --add takes it or as found, not {effect!r:.60}")
         return CalibrationFit(extend(self.core, _effects(effect, self.core), warm=True))
 
     def compensate(self, test: PreparedTest) -> Compensated:

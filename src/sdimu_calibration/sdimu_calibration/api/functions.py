@@ -84,6 +84,8 @@ def open(  # noqa: A001 (as every library of files has it)
     rests : sequence of (float, float)
         By hand: begin and end (s after the first sample) of every rest; without any they are found.
     """
+    if imu is not None and not isinstance(imu, str):
+        _expect("open", "imu", imu, ImuSpecification, "a name in config/imu, a path, or a specification")
     opening = Opening(
         site=site,
         imu=load_imu(imu) if isinstance(imu, str) else imu,
@@ -134,6 +136,8 @@ def open_set(
     reference = None if reference_temperature is None else parse_quantity(reference_temperature, "degC")
     like = BagSource(Path(), site, imu, source or Source(), reference_degc=reference)
     wanted = load_set(Path(bags), like) if isinstance(bags, str | Path) else set_of([Path(bag) for bag in bags], like)
+    if not wanted.members:
+        raise DataError("open_set(bags=...): no bag is named; name the recordings of one unit")
     if serial is not None:
         wanted = replace(wanted, members=tuple(replace(m, serial=serial) for m in wanted.members))
     return OpenedSet(wanted, workers, None if keep is None else Path(keep))

@@ -247,9 +247,13 @@ class Fitted:
     @property
     def asked_estimator(self) -> str:
         """One of the names of estimators, ``auto`` included."""
+        from sdimu_calibration.core.estimation.solve import AUTO
         from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator
 
-        return HANDHELD if self.hand else named_estimator(self.estimator, "--estimator")
+        named = named_estimator(self.estimator, "--estimator")
+        if self.hand and named not in (AUTO, HANDHELD):
+            raise typer.BadParameter(f"is not {HANDHELD}: leave out one of both", param_hint="--hand, --estimator")
+        return HANDHELD if self.hand else named
 
     @property
     def handheld(self) -> bool | None:

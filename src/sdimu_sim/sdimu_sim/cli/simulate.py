@@ -60,10 +60,14 @@ class Kept:
         return {key: text for key, text in (("serial", self.serial), ("power_on", self.power_on)) if text}
 
 
+PLAN = "kim18"
+"""Plan that is simulated where none is stated."""
+
+
 @with_options
 def simulate(
     out: Annotated[Path, typer.Option(help="Bag (folder) to write.")],
-    plan: PlanOption = "kim18",
+    plan: PlanOption = PLAN,
     imu: Annotated[
         str | None, typer.Option(help="IMU that gives the true errors their size; dtg (handheld: mems_by_hand).")
     ] = None,
@@ -89,7 +93,7 @@ def simulate(
         from sdimu_calibration.storage.files.config import load_imu, load_site
         from sdimu_sim.core.by_hand import ByHand
 
-        _refuse_by_hand(drawn)
+        _refuse_by_hand(plan, world, drawn)
         place, sensor = load_site(world.site), load_imu(imu or "mems_by_hand")
         run = ByHand(by_hand, sensor, place, drawn.seed, world.rate, effects=world.effects)
         _by_hand(run, out, truth_path, kept)
@@ -123,9 +127,17 @@ def _tell_twins(effects: Sequence[str]) -> None:
         )
 
 
-def _refuse_by_hand(drawn: Drawn) -> None:
-    """Refuse what a run by hand does not draw."""
-    given = {"--unit": drawn.unit is not None, "--turn-on": bool(drawn.turn_on), "--noise": bool(drawn.noise)}
+def _refuse_by_hand(plan: str, world: World, drawn: Drawn) -> None:
+    """Refuse what belongs to a table, and what a run by hand does not draw."""
+    given = {
+        "--plan": plan != PLAN,
+        "--table": world.table != World.table,
+        "--mount": world.mount is not None,
+        "--temperature": world.temperature is not None,
+        "--unit": drawn.unit is not None,
+        "--turn-on": bool(drawn.turn_on),
+        "--noise": bool(drawn.noise),
+    }
     asked = [option for option, is_there in given.items() if is_there]
     if asked:
         raise DataError(

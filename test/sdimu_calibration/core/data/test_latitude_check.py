@@ -10,7 +10,13 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions, observe_earth_rate, reversed_force
+from sdimu_calibration.core.data.latitude_check import (
+    EarthRate,
+    contradictions,
+    latitude_in_data,
+    observe_earth_rate,
+    reversed_force,
+)
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_plan
@@ -109,3 +115,14 @@ def test_stops_on_one_cone_say_nothing():
     assert found is not None
     assert found.stops > 6
     assert not found.seen
+
+
+@pytest.mark.parametrize(
+    ("sigma_deg", "told"), [(2.0, "36.4 +- 2.0"), (0.02, "36.41 +- 0.02"), (0.003, "36.407 +- 0.003")]
+)
+def test_the_latitude_is_told_to_the_digits_that_its_sigma_leaves(sigma_deg, told):
+    latitude = np.radians(36.407)
+    rate = EarthRate(
+        earth.RATE * np.sin(latitude), earth.RATE * np.cos(latitude) * np.radians(sigma_deg), 9.8, 1e-3, 9, 9.0
+    )
+    assert f"latitude {told} deg" in latitude_in_data(rate)

@@ -148,16 +148,18 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
 def latitude_in_data(seen: EarthRate) -> str:
     """Say the latitude that the rests show."""
     latitude, sigma = np.degrees(seen.latitude)
-    return f"the Earth's rate in the data is that of latitude {latitude:.1f} +- {sigma:.1f} deg"
+    digits = int(np.clip(np.ceil(-np.log10(sigma)), 1, 4))
+    return f"the Earth's rate in the data is that of latitude {latitude:.{digits}f} +- {sigma:.{digits}f} deg"
 
 
 def or_sign(seen: EarthRate, site: Site) -> str:
     """Advise to turn the sign of the force where that would fit; else nothing."""
-    return f", or the sign of the force ({Option.ACCEL_SIGN} -1 would fit)" if reversed_force(seen, site) else ""
+    told = f", or the sign of the force ({Option.ACCEL_SIGN} -1 would fit, or 1 where -1 was stated)"
+    return told if reversed_force(seen, site) else ""
 
 
 def _latitude(site: Site) -> str:
-    return f"{np.degrees(site.latitude_rad):.1f} deg"
+    return f"{round(float(np.degrees(site.latitude_rad)), 4):g} deg"
 
 
 def _rests(windows: Windows) -> list[Ints]:

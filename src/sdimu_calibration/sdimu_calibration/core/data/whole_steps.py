@@ -47,10 +47,14 @@ _SIGMAS = np.repeat([0.5, 0.05, 0.02, 0.05, 1e-4], [3, 9, 3, 9, 9])
 _LEAST_FORCE = 1e-5
 """Noise of a mean force (m/s^2) at least: a microgravity."""
 
-_ACROSS = np.zeros((3, 3, 3))
+_ACROSS = np.array(
+    [
+        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    ]
+)
 """Matrix of the cross product, shape (3, 3, 3): skew(v) = _ACROSS @ v."""
-_ACROSS[(0, 1, 2), (2, 0, 1), (1, 2, 0)] = 1.0
-_ACROSS[(0, 1, 2), (1, 2, 0), (2, 0, 1)] = -1.0
 
 
 class _Turn(NamedTuple):

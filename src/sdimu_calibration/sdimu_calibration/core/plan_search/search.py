@@ -82,6 +82,7 @@ def search(
         )
     if not goal.limits and goal.minutes is None:
         raise DataError("a plan needs a goal: state limits, or the minutes available")
+    _check_numbers(goal)
     first = bounds(start, asked)
     _check_limits(goal, first)
     best = Found(start, first, _worst(first, goal), 1)
@@ -162,6 +163,15 @@ def _runs(plan: Plan) -> bool:
     except DataError:
         return False
     return True
+
+
+def _check_numbers(goal: Goal) -> None:
+    """Refuse times and limits that are not above 0."""
+    if goal.minutes is not None and not goal.minutes > 0.0:
+        raise DataError(f"minutes={goal.minutes:g}: a plan takes more than 0 minutes")
+    wrong = [f"{effect} {limit:g}" for effect, limit in goal.limits.items() if not limit > 0.0]
+    if wrong:
+        raise DataError(f"limits of the sigmas: expected numbers above 0, not {wrong[0]}")
 
 
 def _check_limits(goal: Goal, first: Bounds) -> None:

@@ -77,6 +77,12 @@ def _matters(label: str, stakes: Sequence[tuple[str, str, float]]) -> str:
     return f"Which it is matters: {label} is taken; {'; '.join(parts)}."
 
 
+def _keep(label: str) -> str:
+    # Of an equation that no registered effect is, the data say how it looks, and not what else its cause does.
+    known = ", if you know that it is the cause: the sigmas then take that for granted" if ": " in label else ""
+    return f"Calibrate with {label} in the model{known}"
+
+
 _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.MEND_RECORDING: lambda text: f"Mend the recording first: {text}.",
     Kind.REPEAT_STOPS: lambda: (
@@ -103,7 +109,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.TRY_EQUATION: lambda *labels: (
         f"Try an equation of your own (--try FILE); nearest in this test: {', '.join(labels)}."
     ),
-    Kind.KEEP: lambda label: f"Calibrate with {label or 'what was found'} in the model",
+    Kind.KEEP: lambda label: _keep(label or "what was found"),
     Kind.TRY: lambda label: (
         f"It is open which effect it is: record more before you keep {label}. What it changes"
         if label
