@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,11 @@ from sdimu_calibration.core.note import MISFITS, topic_of
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.files.whole_file import written_together
 
+if TYPE_CHECKING:
+    from sdimu_calibration.core.results import Calibration
+
+_SAME_DEGC = 0.5
+"""Difference of two temperatures (deg C) up to which no coefficient differs by what counts: thermometers scatter so."""
 _NOT_LOOKED_FOR = (
     "Nobody has looked for small effects that the model lacks; one that the fit takes up moves a coefficient by many "
     "of its sigmas. To look:"
@@ -46,7 +51,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
-    from sdimu_calibration.storage.files.reference_file import read_truth
+    from sdimu_calibration.storage.files.reference_file import read_temperature, read_truth
     from sdimu_calibration.storage.files.result_file import write_result
     from sdimu_calibration.storage.trace import traced
 
@@ -74,6 +79,8 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     taken = STANDARD_GRAVITY if test.site is None else None
     true = None if truth is None else read_truth(truth, result.body_frame, taken)
     about = Asked.of((bag,), folder, opening, request)
+    if truth is not None:
+        notes = (*notes, *_other_temperature(truth, read_temperature(truth), result))
     with written_together(folder) as part:
         write_result(part / "result.json", result)
         trace = traced([bag], sys.argv[1:], site=opening.site, imu=opening.imu, model=request.model)
@@ -97,3 +104,17 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     say(console, f"results in {folder}")
     answer(folder / "result.json", request.as_json)
     leave(result)
+
+
+def _other_temperature(path: Path, true_degc: float | None, result: Calibration) -> list[str]:
+    """Say that a truth counts from another temperature than the coefficients of a result, which hang on it."""
+    from sdimu_calibration.core.results import START_TEMPERATURE
+
+    from_degc = result.data.get(START_TEMPERATURE)
+    hangs = any("temperature" in name for name in result.names)
+    if true_degc is None or from_degc is None or not hangs or abs(true_degc - from_degc) < _SAME_DEGC:
+        return []
+    return [
+        f"{path} is the truth at {true_degc:g} degC, and the coefficients are those at {from_degc:g} degC: they differ "
+        f"by the temperature; to compare them: --reference-temperature '{true_degc:g} degC'"
+    ]

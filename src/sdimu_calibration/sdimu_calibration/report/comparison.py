@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from sdimu_calibration.core.error_figures import (
@@ -92,14 +93,17 @@ def _differ(a: Calibration, b: Calibration, key: str) -> bool:
 
 
 def _row(name: str, result: Calibration, before: Calibration | None, held_out: float) -> list[str]:
-    likelihood = log_likelihood(result)
+    # Of a set it lacks what its recordings hold of their own, and each model stands in a noise of its own.
+    likelihood = float("nan") if result.of_set is not None else log_likelihood(result)
     if before is None:
         model, difference, moved = f"{len(result.model)} effects", "", ""
     else:
         model = _change(before.model, result.model)
-        difference = f"{likelihood - log_likelihood(before):+.1f}"
+        gain = likelihood - log_likelihood(before)
+        difference = "" if math.isnan(gain) else f"{gain:+.1f}"
         moved = ", ".join(off.text for off in coefficients_off(before, result)[:_MOST_MOVED])
-    return [name, model, f"{likelihood:.1f}", difference, f"{nis(result):.3f}", f"{held_out:.3f}", moved]
+    told = "" if math.isnan(likelihood) else f"{likelihood:.1f}"
+    return [name, model, told, difference, f"{nis(result):.3f}", f"{held_out:.3f}", moved]
 
 
 def _change(before: tuple[str, ...], after: tuple[str, ...]) -> str:

@@ -112,8 +112,8 @@ def diagnose_set(
         # What was found is taken back, and something is missing all the same: the verdict stays.
         facts = SetFacts(_findings(found), after, found.after, again, None)
     # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
-    open_ones = again is not None and not again.answer and ATTITUDE not in again.told
-    asked = again is not None and (open_ones or ATTITUDE in again.answer)
+    shared = again is not None and not again.answer and not facts.is_of_some
+    asked = again is not None and (shared or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)

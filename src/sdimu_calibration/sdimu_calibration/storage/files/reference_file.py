@@ -94,6 +94,12 @@ def read_truth(path: Path, body_frame: str, gravity: float | None = None) -> dic
     return true if gravity is None else _restated(true, _gravity(path, content) / gravity)
 
 
+def read_temperature(path: Path) -> float | None:
+    """Read the temperature from which the coefficients of a truth count (deg C); None of a test without one."""
+    value = read_mapping(Path(path)).get("reference_degc")
+    return None if value is None else _number(Path(path), "reference_degc", value)
+
+
 def _gravity(path: Path, content: Mapping[str, Any]) -> float:
     """Gravity at the place of a truth (m/s^2)."""
     site = content.get("site")
