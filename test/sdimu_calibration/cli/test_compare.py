@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.cli import main as cli
+from sdimu_calibration.cli.calibrate import _other_temperature
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.results import Calibration, History, Rest
+from sdimu_calibration.core.results import START_TEMPERATURE, Calibration, History, Rest
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.comparison import comparison, headings
 from sdimu_calibration.storage.files.result_file import write_result
 
 _NONE = np.empty(0)
@@ -160,3 +163,22 @@ def test_results_that_leave_out_different_stops_are_told_to_be_no_match(run):
     first = replace(FIRST, data={**FIRST.data, "stops": 19.0})
     assert "leave out different stops" in run(first, replace(SECOND, data={**SECOND.data, "stops": 18.0}))[1]
     assert "leave out different stops" not in run(first, replace(SECOND, data=first.data))[1]
+
+
+def test_log_likelihoods_of_sets_are_not_compared():
+    """They lack what the recordings hold of their own, each model in a noise of its own."""
+    together = replace(FIRST, of_set=SimpleNamespace())
+    second = replace(together, fit=FIRST.fit | {"log_likelihood": 4e6})
+    at = headings([together, second]).index("log-likelihood")
+    assert [line[at : at + 2] for line in comparison(("a", "b"), [together, second])] == [["", ""], ["", ""]]
+    alone = comparison(("a", "b"), [FIRST, replace(FIRST, fit=second.fit)])
+    assert [line[at : at + 2] for line in alone] == [["100.0", ""], ["4000000.0", "+3999900.0"]]
+
+
+def test_a_truth_at_another_temperature_is_said_to_be_one(tmp_path):
+    warm = replace(FIRST, names=("accel_bias_x", "accel_bias_temperature_x"), data={START_TEMPERATURE: 0.1})
+    (told,) = _other_temperature(tmp_path / "truth.yaml", 25.0, warm)
+    assert told.endswith("they differ by the temperature; to compare them: --reference-temperature '25 degC'")
+    assert _other_temperature(tmp_path, 0.0, warm) == []
+    assert _other_temperature(tmp_path, None, warm) == []
+    assert _other_temperature(tmp_path, 25.0, replace(FIRST, data=warm.data)) == []
