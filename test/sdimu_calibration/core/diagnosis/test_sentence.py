@@ -82,7 +82,7 @@ def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike,
     assert verdict(Facts([(label, alike)])) == word
     of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
-    assert verdict_of_set(SetFacts([of_set], after, SimpleNamespace(function=None), None, None)) == word
+    assert verdict_of_set(SetFacts([of_set], after, SimpleNamespace(function=None, reports=()), None, None)) == word
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_members_of_one_recording_and_very_many_of_them_are_said_in_words():
 
 def test_a_set_whose_search_came_to_no_end_is_not_called_consistent(summary):
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
-    fit = SimpleNamespace(function=None)
+    fit = SimpleNamespace(function=None, reports=())
     assert verdict_of_set(SetFacts([], after, fit, None, None)) == Verdict.UNEXPLAINED
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.9, (), ()))) == Verdict.CONSISTENT
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.4, (), ()))) == Verdict.CLASS_OF_EFFECTS
