@@ -33,3 +33,10 @@ def test_what_the_data_do_not_show_contradicts_nothing():
     weight = np.full(1, 4.0)
     assert not held_back(weight, np.zeros(1), np.diag(1.0 / weight)).any()
     assert np.isfinite(without_prior(weight, np.zeros(1), np.diag(1.0 / weight))).all()
+
+
+def test_noise_with_a_memory_contradicts_no_prior():
+    """The data of a weak coefficient are further off than white noise says; far beyond its prior it is so in any."""
+    weight, estimate, covariance = estimated(np.array([2.0, 0.6]), np.array([0.35, 0.01]), np.full(2, 0.1))
+    assert held_back(weight, estimate, covariance).tolist() == [True, True]
+    assert held_back(weight, estimate, covariance, scatter=4.0).tolist() == [False, True]

@@ -25,6 +25,7 @@ from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     NAV,
     PassInput,
+    PassOutput,
     PassSettings,
     PassState,
     new_output,
@@ -309,7 +310,9 @@ class Solution(Generic[AnyPass]):
     """The coefficients stood still at the end."""
 
 
-def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: Floats) -> ImuModel:
+def widen_contradicted_priors(
+    sensors: ImuModel, estimate: Floats, covariance: Floats, scatter: float = 1.0
+) -> ImuModel:
     """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
 
     A prior is a statement about the class of the sensor; one that the model states of a coefficient is taken at its
@@ -323,16 +326,18 @@ def widen_contradicted_priors(sensors: ImuModel, estimate: Floats, covariance: F
         With p parameters.
     estimate, covariance : ndarray, shapes (p,) and (p, p)
         SI.
+    scatter : float
+        Scatter of the means of the innovations at stops, in that of white noise (1).
     """
     gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
-    held = held_back(sensors.weight, estimate, covariance) & ~gauge & ~sensors.restated
+    held = held_back(sensors.weight, estimate, covariance, scatter) & ~gauge & ~sensors.restated
     if not held.any():
         return sensors
     free = without_prior(sensors.weight, estimate, covariance)
     return replace(sensors, prior=np.where(held, ROOM * np.abs(free), sensors.prior))
 
 
-def held_back(weight: Floats, estimate: Floats, covariance: Floats) -> Bools:
+def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: float = 1.0) -> Bools:
     """Tell the coefficients whose data are far beyond their prior, and that it holds back.
 
     The prior p and what the data say by themselves d differ by ``d / sqrt(sigma_d^2 + sigma_p^2)`` sigmas, which of an
@@ -345,14 +350,30 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats) -> Bools:
         Prior information (1/SI^2).
     estimate, covariance : ndarray, shapes (p,) and (p, p)
         SI.
+    scatter : float
+        Root of what the variance of the data is over that of the covariance (1): in noise with a memory, which the
+        passes do not know, data of a weak coefficient are further off than white noise says.
 
     Returns
     -------
     ndarray of bool, shape (p,)
     """
     size, variance = np.abs(estimate), np.diag(covariance)
-    beyond = size * np.sqrt(weight) > _BEYOND * np.sqrt(_of_data(weight, variance))
+    # An estimate that is far beyond its prior is so in any noise.
+    beyond = size * np.sqrt(weight) > _BEYOND * np.minimum(scatter * np.sqrt(_of_data(weight, variance)), 1.0)
     return np.asarray(beyond & (size * np.sqrt(variance) * weight > _PULL))
+
+
+def scatter_of_stops(output: PassOutput, prepared: PreparedData) -> float:
+    """Give the scatter of the means of the innovations at stops, over that in white noise (1); 1 where it is less."""
+    standard, phases, total, count = output.innovation / output.innovation_sigma, prepared.phases, 0.0, 0
+    for stop in np.unique(phases.stop[prepared.kind > 0]):
+        rows = standard[(phases.stop == stop) & (prepared.kind > 0)]
+        number = np.isfinite(rows).sum(axis=0)
+        seen = number > 0
+        total += float(np.sum(np.nansum(rows[:, seen], axis=0) ** 2 / number[seen]))
+        count += int(seen.sum())
+    return max(1.0, float(np.sqrt(total / max(count, 1))))
 
 
 def without_prior(weight: Floats, estimate: Floats, covariance: Floats) -> Floats:
@@ -434,7 +455,8 @@ def with_room(
     """
     for _ in range(MOST_WIDENINGS):
         setup, last = found.setup, found.last
-        wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance)
+        scatter = scatter_of_stops(last.output, found.prepared)
+        wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance, scatter)
         if wider is setup.sensors:
             break
         setup = replace(setup, sensors=wider)
