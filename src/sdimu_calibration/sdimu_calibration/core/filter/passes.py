@@ -365,7 +365,13 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
 
 
 def scatter_of_stops(output: PassOutput, prepared: PreparedData) -> float:
-    """Give the scatter of the means of the innovations at stops, over that in white noise (1); 1 where it is less."""
+    """Give the scatter of the means of the innovations at stops, over that in white noise (1); 1 where it is less.
+
+    Parameters
+    ----------
+    output : PassOutput
+        Of a pass over e epochs.
+    """
     standard, phases, total, count = output.innovation / output.innovation_sigma, prepared.phases, 0.0, 0
     for stop in np.unique(phases.stop[prepared.kind > 0]):
         rows = standard[(phases.stop == stop) & (prepared.kind > 0)]
