@@ -311,10 +311,7 @@ LONG = {
     ),
     "test/recovery/test_recovery.py": ("test_whole_plan_recovers_the_coefficients_within_their_covariance",),
     "test/sdimu_calibration/core/joint/test_same_unit.py": ("test_a_set_says_that_its_axes_are_not_told",),
-    "test/sdimu_calibration/core/diagnosis/test_traps.py": (
-        "test_a_filter_that_forgets_shared_noise_inflates_the_scores_of_gyro_drifts",
-        "test_regressors_of_measured_motion_make_a_dead_band_of_noise",
-    ),
+    "test/sdimu_calibration/core/diagnosis/test_traps.py": (),
     "test/sdimu_calibration/core/estimation/test_stated_priors.py": (
         "test_a_stated_prior_conditions_the_fit_of_the_other_coefficients[gyro_misalignment_yz-second-order-0.5]",
     ),
@@ -340,7 +337,6 @@ VARIANTS = {
         "test_the_estimator_does_not_hang_on_how_noise_cuts_the_rests[kim18-50001]",
     ),
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py": (
-        "test_an_azimuth_that_the_site_states_counts_where_it_is_known_well_enough[3.0-False]",
         "test_the_answer_is_the_same_for_every_azimuth_that_is_assumed[90.0]",
         "test_the_answer_is_the_same_for_every_azimuth_that_is_assumed[270.0]",
         "test_white_noise_leaves_as_much_of_the_azimuth_as_the_mean_rates_do[recommended]",
@@ -359,7 +355,6 @@ VARIANTS = {
         "test_what_is_of_each_recording_does_not_come_back[time]",
     ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
-        "test_noise_that_moves_within_the_only_rest_of_a_recording_is_no_warm_up[mems_consumer-210010-turns1-None]",
         "test_up_and_down_are_a_set_whatever_their_order_and_names[fog_tactical-1]",
         "test_up_and_down_are_a_set_whatever_their_order_and_names[mems_by_hand-1]",
         "test_up_and_down_are_a_set_whatever_their_order_and_names[rlg_navigation-1]",

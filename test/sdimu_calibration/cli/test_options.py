@@ -125,3 +125,14 @@ def test_no_two_verbs_declare_the_same_option():
     assert len(calls) > 50
     same = Counter(ast.unparse(call) for call in calls)
     assert [text for text, count in same.items() if count > 1] == []
+
+
+@pytest.mark.parametrize(("estimator", "asked"), [("auto", "handheld"), ("handheld", "handheld"), ("hand", "handheld")])
+def test_by_hand_is_the_estimator_of_a_run_by_hand(estimator, asked):
+    assert Fitted(estimator=estimator, hand=True).asked_estimator == asked
+
+
+@pytest.mark.parametrize("estimator", ["filter", "second-order", "batch"])
+def test_by_hand_excludes_the_estimators_of_a_table(estimator):
+    with pytest.raises(typer.BadParameter, match="leave out one of both"):
+        _ = Fitted(estimator=estimator, hand=True).asked_estimator

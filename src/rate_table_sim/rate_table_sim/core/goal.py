@@ -141,13 +141,13 @@ def _polynomial(
     point: GoalPoint, state: AxisState, bend: Floats | None, begin_s: float, end_s: float, t: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Angle and rate (n, 3) at the times t, and the largest acceleration (3,) between two points."""
+    from scipy.interpolate import BPoly  # noqa: PLC0415 (0.3 s that a table without a trajectory does not need)
+
     left = [state.angle, state.rate]
     right = [point.angle, np.zeros(3) if point.rate is None else point.rate]
     if point.acceleration is not None:
         left.append(np.zeros(3) if bend is None else bend)
         right.append(point.acceleration)
-    from scipy.interpolate import BPoly  # noqa: PLC0415 (0.3 s that a table without a trajectory does not need)
-
     curve = BPoly.from_derivatives([begin_s, end_s], [left, right])
     ends = np.array([begin_s, end_s])
     steepest = np.abs(curve(np.concatenate([ends, t]), 2)).max(axis=0)

@@ -148,7 +148,7 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
 def latitude_in_data(seen: EarthRate) -> str:
     """Say the latitude that the rests show."""
     latitude, sigma = np.degrees(seen.latitude)
-    digits = int(np.clip(np.ceil(-np.log10(sigma)), 1, 4))
+    digits = int(np.clip(np.ceil(-np.log10(max(sigma, 1e-4))), 1, 4))
     return f"the Earth's rate in the data is that of latitude {latitude:.{digits}f} +- {sigma:.{digits}f} deg"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.prepared import PreparedData
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.filter.filter_pass import PassOutput
+from sdimu_calibration.core.filter.means_at_stops import means_at_stops
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.probability import chi2_head, chi2_tail
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
@@ -230,13 +231,9 @@ def stop_means(standard: Floats, prepared: PreparedData) -> tuple[StopMean, ...]
     tuple of StopMean
         The mean over the m epochs of a stop, times the root of m.
     """
-    out = []
-    for stop in np.unique(prepared.phases.stop[prepared.kind > 0]):
-        rows = (prepared.phases.stop == stop) & (prepared.kind > 0)
-        for channel in range(12):
-            values = standard[rows, channel]
-            values = values[np.isfinite(values)]
-            if len(values):
-                mean = float(values.sum() / np.sqrt(len(values)))
-                out.append(StopMean(CHANNEL_NAMES[channel], int(stop), mean))
+    stops, means = means_at_stops(standard, prepared)
+    out = [
+        StopMean(CHANNEL_NAMES[channel], int(stops[row]), float(means[row, channel]))
+        for row, channel in np.argwhere(np.isfinite(means)).tolist()
+    ]
     return tuple(sorted(out, key=lambda m: -abs(m.normalised_mean)))

@@ -25,13 +25,13 @@ from sdimu_calibration.core.filter.filter_pass import (
     COPY,
     NAV,
     PassInput,
-    PassOutput,
     PassSettings,
     PassState,
     new_output,
     run_pass,
 )
 from sdimu_calibration.core.filter.impossible_prior import impossible_prior, possible
+from sdimu_calibration.core.filter.means_at_stops import means_at_stops
 from sdimu_calibration.core.filter.pass_loop import AnyPass, Ending, FinishedPass, until_nothing_moves
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.navigation.track import Correction, motion
@@ -330,15 +330,15 @@ def widen_contradicted_priors(
         Scatter of the means of the innovations at stops, in that of white noise (1).
     """
     gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
-    held = held_back(sensors.weight, estimate, covariance, scatter) & ~gauge & ~sensors.restated
+    held, data = held_back(sensors.weight, estimate, covariance, scatter)
+    held &= ~gauge & ~sensors.restated
     if not held.any():
         return sensors
-    free = without_prior(sensors.weight, estimate, covariance)
-    return replace(sensors, prior=np.where(held, ROOM * np.abs(free), sensors.prior))
+    return replace(sensors, prior=np.where(held, ROOM * np.abs(data), sensors.prior))
 
 
-def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: float = 1.0) -> Bools:
-    """Tell the coefficients whose data are far beyond their prior, and that it holds back.
+def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: float = 1.0) -> tuple[Bools, Floats]:
+    """Tell the coefficients whose data are far beyond their prior and that it holds back, and what the data say.
 
     The prior p and what the data say by themselves d differ by ``d / sqrt(sigma_d^2 + sigma_p^2)`` sigmas, which of an
     estimate x of variance v is ``x / (sigma_p sqrt(1 - v / sigma_p^2))``: where the data know less than the prior, the
@@ -351,58 +351,20 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
     estimate, covariance : ndarray, shapes (p,) and (p, p)
         SI.
     scatter : float
-        Root of what the variance of the data is over that of the covariance (1): in noise with a memory, which the
-        passes do not know, data of a weak coefficient are further off than white noise says.
+        Scatter of the data over that which the covariance knows (1): in noise with a memory, which the passes do not
+        know, data of a weak coefficient are further off than white noise says.
 
     Returns
     -------
-    ndarray of bool, shape (p,)
+    held : ndarray of bool, shape (p,)
+    data : ndarray, shape (p,)
+        Each coefficient without its own prior (SI).
     """
     size, variance = np.abs(estimate), np.diag(covariance)
+    of_data = np.maximum(1.0 - weight * variance, _LEAST_SHARE)
     # An estimate that is far beyond its prior is so in any noise.
-    beyond = size * np.sqrt(weight) > _BEYOND * np.minimum(scatter * np.sqrt(_of_data(weight, variance)), 1.0)
-    return np.asarray(beyond & (size * np.sqrt(variance) * weight > _PULL))
-
-
-def scatter_of_stops(output: PassOutput, prepared: PreparedData) -> float:
-    """Give the scatter of the means of the innovations at stops, over that in white noise (1); 1 where it is less.
-
-    Parameters
-    ----------
-    output : PassOutput
-        Of a pass over e epochs.
-    """
-    standard, phases, total, count = output.innovation / output.innovation_sigma, prepared.phases, 0.0, 0
-    for stop in np.unique(phases.stop[prepared.kind > 0]):
-        rows = standard[(phases.stop == stop) & (prepared.kind > 0)]
-        number = np.isfinite(rows).sum(axis=0)
-        seen = number > 0
-        total += float(np.sum(np.nansum(rows[:, seen], axis=0) ** 2 / number[seen]))
-        count += int(seen.sum())
-    return max(1.0, float(np.sqrt(total / max(count, 1))))
-
-
-def without_prior(weight: Floats, estimate: Floats, covariance: Floats) -> Floats:
-    """Give each coefficient as the data say it without its own prior.
-
-    Parameters
-    ----------
-    weight : ndarray, shape (p,)
-        Prior information (1/SI^2).
-    estimate, covariance : ndarray, shapes (p,) and (p, p)
-        SI.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        SI.
-    """
-    return np.asarray(estimate / _of_data(weight, np.diag(covariance)))
-
-
-def _of_data(weight: Floats, variance: Floats) -> Floats:
-    """Share of the information on each coefficient (1) that is of the data and not of its prior, shape (p,)."""
-    return np.asarray(np.maximum(1.0 - weight * variance, _LEAST_SHARE))
+    beyond = size * np.sqrt(weight) > _BEYOND * np.minimum(scatter * np.sqrt(of_data), 1.0)
+    return beyond & (size * np.sqrt(variance) * weight > _PULL), estimate / of_data
 
 
 _BEYOND = 3.0
@@ -461,7 +423,8 @@ def with_room(
     """
     for _ in range(MOST_WIDENINGS):
         setup, last = found.setup, found.last
-        scatter = scatter_of_stops(last.output, found.prepared)
+        means = means_at_stops(last.output.innovation / last.output.innovation_sigma, found.prepared)[1]
+        scatter = max(1.0, float(np.sqrt(np.nanmean(means**2))))
         wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance, scatter)
         if wider is setup.sensors:
             break

@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
-from sdimu_calibration.core.filter.passes import ROOM, held_back, without_prior
+from sdimu_calibration.core.filter.passes import ROOM, held_back
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 
@@ -51,11 +51,11 @@ def widened(weight: Floats, names: Sequence[str], estimate: Floats, covariance: 
     ndarray, shape (P,)
         1/SI^2.
     """
-    held = held_back(weight, estimate, covariance) & ~_kept(names)
+    held, data = held_back(weight, estimate, covariance)
+    held &= ~_kept(names)
     if not held.any():
         return weight
-    free = np.abs(without_prior(weight, estimate, covariance))
-    return np.where(held, (ROOM * np.where(held, free, 1.0)) ** -2.0, weight)
+    return np.where(held, (ROOM * np.abs(np.where(held, data, 1.0))) ** -2.0, weight)
 
 
 def _kept(names: Sequence[str]) -> Bools:

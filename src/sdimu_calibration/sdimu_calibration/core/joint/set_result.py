@@ -244,7 +244,7 @@ def _misfit(fit: SetFit) -> list[Note]:
 def worst_figure(report: Report) -> float:
     """Give the worse of NIS and held-out error (1), as a recording by itself is judged: above `MISFIT` no fit."""
     figures = report.statistics.judged(may_be_an_effect(report.noise))
-    return max(x for x in figures if x is not None and not np.isnan(x))
+    return max((x for x in figures if x is not None and not np.isnan(x)), default=0.0)
 
 
 def _figures(report: Report) -> str:

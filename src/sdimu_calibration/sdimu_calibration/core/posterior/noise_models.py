@@ -68,11 +68,12 @@ _NEAR = 6.0
 """Log posterior (1) behind the best noise up to which another one is kept: effects beside it may change that much."""
 _MOST = 40
 """Number of noises that are kept at most: with eight kinds of each triad, those behind weigh a thousandth together."""
-_SWEEPS, _SETTLED = 4, 0.1
-"""Number of times at most that terms take their sizes in turn, and the gain of log posterior (1) that ends it: no
-probability changes by more than a tenth."""
-_BETTER = 4
-"""Number of times at most that another term takes the place of one of the best noise: two were enough in a campaign."""
+_SETTLED = 0.1
+"""Gain of log posterior (1) from which sizes are taken in turn once more, and another noise is gone on from: less
+changes no probability by more than a tenth."""
+_MOST_STEPS = 4
+"""Number of times at most that all sizes are taken in turn, and that another term takes the place of one of the best
+noise: as many terms as a noise has."""
 _SHARES = (0.3, 0.7)
 """Share (1) of what effects explain that one term, and two terms, must explain for more to be looked for: a third adds
 less than the second."""
@@ -259,7 +260,7 @@ class _Search:
     def settled(self, terms: Sequence[NoiseTerm]) -> _Found:
         """Find the sizes of several terms together, each in turn until they stand; leave out what is no longer seen."""
         found = self._sized_in_turn(terms)
-        for _ in range(_SWEEPS - 1):
+        for _ in range(_MOST_STEPS - 1):
             if len(found.noise.terms) < 2:
                 break
             again = self._sized_in_turn(found.noise.terms)
@@ -342,7 +343,7 @@ def explored(
             if len(option.noise.terms) < 2
             else max(search.settled(option.noise.terms), option, key=lambda found: found.score)
         )
-    for _ in range(_BETTER):
+    for _ in range(_MOST_STEPS):
         for place in range(len(best.noise.terms)):
             if len(best.noise.terms) > 1:
                 search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
