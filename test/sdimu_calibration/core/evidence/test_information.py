@@ -21,3 +21,9 @@ def test_what_is_estimated_along_is_left_without_information_and_the_rest_is_tha
     joint = np.linalg.solve(W.T @ W + np.diag(prior), W.T @ e)
     alone = np.linalg.solve(left.J[np.ix_(others, others)], left.d[others])
     np.testing.assert_allclose(alone, joint[others], rtol=1e-10)
+
+
+def test_an_information_that_rounding_made_negative_has_no_likelihood_and_no_warning():
+    J = np.diag([1.0, -1e-16])
+    with np.errstate(invalid="raise"):
+        assert Information(J, np.zeros(2)).log_likelihood(np.array([1.0, 0.0])) == -np.inf

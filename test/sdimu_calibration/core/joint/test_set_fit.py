@@ -132,8 +132,8 @@ def test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_t
     some = unit_set(19, [short()] * 2, ("accel_x: sin(7 fx/g + 4 fy/g)=100 ug",))
     result = set_outcome(fit_set(some.members, options, here))
     line = next(text for text in result.warnings if "does not fit" in text)
-    assert "r0 " in line
-    assert "r1 " in line
+    assert "r0: " in line
+    assert "r1: " in line
     assert line.endswith("run: sdimu diagnose")
 
 

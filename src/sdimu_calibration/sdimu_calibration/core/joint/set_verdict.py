@@ -84,9 +84,11 @@ class SetFacts:
 
     @property
     def is_of_some(self) -> bool:
-        """Whether some recordings have large errors that noise of theirs takes in, and others have no such noise."""
-        loud = [may_be_an_effect(r.noise) and worst_figure(r) > MISFIT for r in self.fit.reports]
-        return any(loud) and any(not r.noise for r in self.fit.reports)
+        """Whether some recordings have large errors that noise of theirs takes in, and others neither errors nor noise."""
+        loud = [worst_figure(r) > MISFIT for r in self.fit.reports]
+        taken_in = [is_loud and may_be_an_effect(r.noise) for is_loud, r in zip(loud, self.fit.reports, strict=True)]
+        quiet = [not is_loud and not r.noise for is_loud, r in zip(loud, self.fit.reports, strict=True)]
+        return any(taken_in) and any(quiet)
 
     @property
     def comes_back(self) -> bool:
