@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
+from sdimu_calibration.core.evidence import learned_noise
 from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.learned_noise import (
     InModes,
@@ -165,6 +166,14 @@ def test_noise_far_above_white_noise_has_an_interval(cut):
 def test_white_noise_has_no_memory(cut):
     false = sum(bool(learn(drawn(cut, [], seed), cut)) for seed in range(100, 200))
     assert false <= 3
+
+
+@pytest.mark.timeout(60)
+def test_learning_ends_where_terms_come_and_go(cut, monkeypatch):
+    sure = replace(NoiseTerm("gyro", "flicker"), size=1.0, gain=100.0)
+    monkeypatch.setattr(learned_noise, "_best_sizes", lambda *_: [sure])
+    monkeypatch.setattr(learned_noise, "refined", lambda _i, _c, terms: tuple(terms)[-1:])
+    assert learn(drawn(cut, [], 1), cut) == (sure,)
 
 
 def test_noise_of_one_triad_is_not_told_of_the_other(cut):

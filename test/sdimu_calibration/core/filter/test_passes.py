@@ -14,7 +14,7 @@ def estimated(data, sigma, prior):
     return weight, data * known / (known + weight), np.diag(1.0 / (known + weight))
 
 
-@pytest.mark.parametrize("sigma", [0.001, 0.3, 3.0])
+@pytest.mark.parametrize("sigma", [0.001, 0.3, 0.4])
 def test_a_prior_is_contradicted_by_the_distance_of_the_data_whatever_they_know(sigma):
     prior = np.full(2, 0.1)
     limit = 3.0 * np.hypot(sigma, prior[0])
@@ -27,6 +27,14 @@ def test_a_prior_is_contradicted_by_the_distance_of_the_data_whatever_they_know(
 def test_without_its_prior_a_coefficient_is_what_the_data_say():
     data, sigma = np.array([2.0, -0.3]), np.array([0.35, 0.02])
     assert held_back(*estimated(data, sigma, np.full(2, 0.1)))[1] == pytest.approx(data)
+
+
+def test_data_that_know_far_less_than_the_prior_are_not_asked_what_they_say_without_it():
+    """What they say lies a thousand times beyond the prior, where no fit of one rest is linear."""
+    weight, estimate, covariance = estimated(np.array([12.0, 400.0]), np.full(2, 1.0), np.full(2, 0.1))
+    held, data = held_back(weight, estimate, covariance)
+    assert held.tolist() == [False, True]
+    assert data == pytest.approx(estimate)
 
 
 def test_what_the_data_do_not_show_contradicts_nothing():

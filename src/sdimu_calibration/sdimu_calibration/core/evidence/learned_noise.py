@@ -214,8 +214,13 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
         Terms to begin with.
     """
     terms = refined(information, cut, start)
-    tried = kinds(cut)
+    tried, seen = kinds(cut), set[frozenset[tuple[str, str, float]]]()
     while True:
+        # Terms that come and go would never end: about a fit that is far off, sizes are not what they are alone.
+        which = frozenset((t.triad, t.kind, t.tau) for t in terms)
+        if which in seen:
+            return _tuned(information, cut, terms)
+        seen.add(which)
         given = given_terms(information, cut, terms)
         options = [
             size

@@ -358,10 +358,11 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
     -------
     held : ndarray of bool, shape (p,)
     data : ndarray, shape (p,)
-        Each coefficient without its own prior (SI).
+        Each coefficient without its own prior (SI); the estimate itself where the data hardly know it.
     """
     size, variance = np.abs(estimate), np.diag(covariance)
-    of_data = np.maximum(1.0 - weight * variance, _LEAST_SHARE)
+    of_data = 1.0 - weight * variance
+    of_data = np.where(of_data > _LEAST_SHARE, of_data, 1.0)
     # An estimate that is far beyond its prior is so in any noise.
     beyond = size * np.sqrt(weight) > _BEYOND * np.minimum(scatter * np.sqrt(of_data), 1.0)
     return beyond & (size * np.sqrt(variance) * weight > _PULL), estimate / of_data
@@ -369,9 +370,10 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
 
 _BEYOND = 3.0
 """Distance of the data from the prior (sigma of both) from which they contradict it: chance ends there."""
-_LEAST_SHARE = 1e-3
-"""Share of the information on a coefficient (1) that data have at least: less is a difference of nearly equal
-numbers."""
+_LEAST_SHARE = 0.05
+"""Share of the information on a coefficient (1) from which data speak by themselves: with less they know it to four
+sigmas of its prior, so far off that a fit of one rest is not linear any more, and noise with a memory widens a prior a
+thousandfold."""
 _PULL = 0.1
 """Shift of an estimate by its prior (sigma of the estimate) from which the passes are repeated: less is not seen."""
 ROOM = 10.0

@@ -89,15 +89,17 @@ class Combination:
     """
 
     def __init__(self, groups: Sequence[Rows], weight: Floats, components: Sequence[Component]) -> None:
-        J = np.stack([g.A.T @ g.A for g in groups])
-        d = np.stack([g.A.T @ g.y for g in groups])
-        self.squared = float(sum(g.y @ g.y for g in groups))
         self.components = tuple(components)
         self.varying = np.concatenate([np.empty(0, np.int64), *(c.columns for c in components)]).astype(np.int64)
+        own = [_varying_first(g, self.varying) for g in groups]
+        squares = sum(np.sum(g.A**2, axis=0) for g in groups)
         # In units in which every parameter has an information of one: SI units differ by many orders.
-        self.unit = 1.0 / np.sqrt(np.diagonal(J, axis1=1, axis2=2).sum(axis=0) + weight)
-        self.J = J * np.outer(self.unit, self.unit)
-        self.d = d * self.unit
+        self.unit = 1.0 / np.sqrt(squares + weight)
+        self.A = np.stack([one.varying.A * self.unit for one in own])
+        self.y = np.stack([one.varying.y for one in own])
+        rest = [one.rest.A * self.unit for one in own]
+        self.J_rest = np.asarray(sum(A.T @ A for A in rest))
+        self.d_rest = np.asarray(sum(A.T @ one.rest.y for A, one in zip(rest, own, strict=True)))
         self.weight = weight * self.unit**2
 
     def sizes(self, tau: Floats) -> Floats:
@@ -119,7 +121,7 @@ class Combination:
     def resolution(self, component: int) -> float:
         """Typical sigma (SI) with which one power-on alone tells the deviation of a component's coefficient."""
         columns = self.components[component].columns
-        J = self.J[:, columns, columns] / self.unit[columns] ** 2
+        J = np.sum((self.A[:, :, columns] / self.unit[columns]) ** 2, axis=1)
         return float(np.median(1.0 / np.sqrt(np.maximum(J, 1e-300))))
 
     def log_likelihood(self, tau: Floats) -> float:
@@ -151,17 +153,21 @@ class Combination:
         return self._reduced(tau)[:2]
 
     def _reduced(self, tau: Floats) -> tuple[float, Information, Floats, Floats]:
-        """Integrate as `integrated` does; M^-1 of each power-on and D [J d] of the varying rows besides."""
-        v = self.varying
-        D = self.sizes(tau)
-        right = np.concatenate([self.J[:, v, :], self.d[:, v, None]], axis=2) * D[:, None]
-        M = np.eye(len(v)) + self.J[:, v[:, None], v] * np.outer(D, D)
-        inverse = np.linalg.inv(M)
-        X = inverse @ right
-        J = self.J.sum(axis=0) - np.einsum("gvp,gvq->pq", right[:, :, :-1], X[:, :, :-1])
-        d = self.d.sum(axis=0) - np.einsum("gvp,gv->p", right[:, :, :-1], X[:, :, -1])
-        constant = 0.5 * (np.einsum("gv,gv->", right[:, :, -1], X[:, :, -1]) - np.linalg.slogdet(M)[1].sum())
-        return float(constant), Information(J, d), np.asarray(inverse), right
+        """Integrate as `integrated` does; S^-1 [A y] of each power-on and R D besides.
+
+        S = I + R D^2 R' is the covariance of the rows that see the deviations, R their varying columns. The sum of
+        squares that S^-1 makes of A stays positive for every size; a difference of informations would not.
+        """
+        R = self.A[:, :, self.varying] * self.sizes(tau)
+        S = np.eye(R.shape[1]) + R @ np.swapaxes(R, 1, 2)
+        rows = np.concatenate([self.A, self.y[:, :, None]], axis=2)
+        root = np.linalg.cholesky(S)
+        white = np.linalg.solve(root, rows)
+        A, y = white[:, :, :-1].reshape(-1, len(self.unit)), white[:, :, -1].ravel()
+        seen = 0.5 * (float(np.sum(self.y**2)) - float(y @ y))
+        constant = seen - float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
+        information = Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y)
+        return constant, information, np.linalg.solve(np.swapaxes(root, 1, 2), white), R
 
     def estimate(self, tau: Floats) -> JointEstimate:
         """Estimate all parameters and deviations, the sigmas given.
@@ -171,15 +177,36 @@ class Combination:
         tau : ndarray, shape (c,)
             Sigma of each component (SI).
         """
-        constant, information, inverse, right = self._reduced(tau)
+        constant, information, weighed, R = self._reduced(tau)
         likelihood = constant + information.log_likelihood(self.weight)
         everything = np.arange(len(self.unit))
         values, covariance = information.estimate(everything, self.weight)
-        D = self.sizes(tau)
-        gain = inverse @ right[:, :, :-1]
-        u = np.einsum("gvw,gw->gv", inverse, right[:, :, -1] - right[:, :, :-1] @ values)
-        var_u = np.diagonal(inverse + gain @ covariance @ np.swapaxes(gain, 1, 2), axis1=1, axis2=2)
-        unit = self.unit[self.varying] * D
+        gain = np.swapaxes(R, 1, 2) @ weighed
+        u = gain[:, :, -1] - gain[:, :, :-1] @ values
+        alone = np.linalg.inv(np.eye(R.shape[2]) + np.swapaxes(R, 1, 2) @ R)
+        spread = gain[:, :, :-1] @ covariance @ np.swapaxes(gain[:, :, :-1], 1, 2)
+        var_u = np.diagonal(alone + spread, axis1=1, axis2=2)
+        unit = self.unit[self.varying] * self.sizes(tau)
         return JointEstimate(
             values * self.unit, covariance * np.outer(self.unit, self.unit), u * unit, np.sqrt(var_u) * unit, likelihood
         )
+
+
+@dataclass(frozen=True)
+class _Split:
+    """Rows of a power-on of which the first alone see what varies: as many as vary."""
+
+    varying: Rows
+    rest: Rows
+
+
+def _varying_first(rows: Rows, varying: Ints) -> _Split:
+    """Turn the rows of a power-on by a QR decomposition that begins with the varying columns."""
+    v, P = len(varying), rows.A.shape[1]
+    order = np.concatenate([varying, np.setdiff1d(np.arange(P), varying)])
+    R: Floats = np.asarray(np.linalg.qr(np.column_stack([rows.A[:, order], rows.y]), mode="r"))
+    # The last row, where there is one, is what no parameter explains.
+    first, rest = np.zeros((v, P + 1)), np.asarray(R[v:P])
+    first[: min(v, len(R))] = R[:v]
+    back: Ints = np.argsort(order)
+    return _Split(Rows(first[:, back], first[:, P]), Rows(rest[:, back], rest[:, P]))

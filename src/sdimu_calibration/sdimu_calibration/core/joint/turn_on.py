@@ -125,4 +125,4 @@ def _with_interval(combined: Combination, tau: Floats, k: int, scale: float) -> 
         low = float(np.exp(brentq(above, bottom, begin, xtol=1e-3)))
     high = float(np.exp(brentq(above, begin, end, xtol=1e-3))) if above(end) < 0.0 else float("inf")
     effect = combined.components[k].effect
-    return TurnOn(effect, float(tau[k]), low, high, len(combined.J))
+    return TurnOn(effect, float(tau[k]), low, high, len(combined.y))
