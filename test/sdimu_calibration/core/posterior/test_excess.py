@@ -9,6 +9,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
+from sdimu_calibration.core.posterior import told
 from sdimu_calibration.core.posterior.posterior import posterior
 from sdimu_calibration.core.posterior.told import probabilities
 
@@ -44,13 +45,22 @@ def test_a_variance_that_the_noise_lacks_is_found_and_weighs_as_if_it_were_state
     root = np.sqrt(found.board.excess)
     stated = posterior(drawn(evidence, evidence.W / root, residuals / root), ground.allowed, None)
     assert stated.board.excess == pytest.approx(1.0, abs=0.01)
-    told, right = ({(f.family, f.sensor): f.probability for f in probabilities(p).families} for p in (found, stated))
+    ours, right = ({(f.family, f.sensor): f.probability for f in probabilities(p).families} for p in (found, stated))
     assert right["accel_quadratic", "accel_x"] > 0.1
-    for family in right.keys() | told.keys():
-        assert told.get(family, 0.0) == pytest.approx(right.get(family, 0.0), abs=0.03), family
+    for family in right.keys() | ours.keys():
+        assert ours.get(family, 0.0) == pytest.approx(right.get(family, 0.0), abs=0.03), family
 
 
 def test_noise_as_stated_has_no_excess(ground):
     evidence = ground.evidence
     noise = np.random.default_rng(12).standard_normal(len(evidence.e))
     assert posterior(drawn(evidence, evidence.W, noise), ground.allowed, None).board.excess < 1.06
+
+
+def test_every_member_that_is_told_has_a_size_however_few_models_are_worked_out(ground, residuals, monkeypatch):
+    evidence = ground.evidence
+    found = posterior(drawn(evidence, evidence.W, residuals), ground.allowed, None)
+    monkeypatch.setattr(told, "_MOST", 1)
+    members = [m for family in probabilities(found).families for m in family.members]
+    assert len(members) > len(found.models[0].members)
+    assert np.isfinite([(m.value, m.sigma) for m in members]).all()

@@ -19,7 +19,8 @@ from sdimu_calibration.core.posterior.posterior import Posterior
 LEAST = 0.01
 """Probability below which something is not told (1): it is one in a hundred."""
 _MOST = 200
-"""Number of models whose sizes are worked out, the likeliest first: they hold nearly all of the probability."""
+"""Number of models whose sizes are worked out, the likeliest first: they hold nearly all of the probability. Of the
+others only those that hold something of which no size is known yet."""
 
 
 @dataclass(frozen=True)
@@ -102,12 +103,12 @@ def probabilities(found: Posterior[E], told: Sequence[NoiseTerm] = ()) -> Probab
     label = {k: found.candidate(k).label for k in found.held}
     of_label, of_family = found.of_each(label), found.of_each(family)
     members: dict[str, list[MemberShare]] = {}
-    sizes = _sizes(found)
+    sizes = _sizes(found, [k for k in found.held if of_label[label[k]] >= LEAST])
     for k in found.held:
         share = of_label[label[k]]
         if share >= LEAST:
             p = found.candidate(k).parameter
-            one = MemberShare(label[k], share, *sizes.get(k, (np.nan, np.nan)), p.unit, p.display_unit)
+            one = MemberShare(label[k], share, *sizes[k], p.unit, p.display_unit)
             members.setdefault(family[k], []).append(one)
     families = []
     for name, share in of_family.items():
@@ -133,12 +134,17 @@ def _shares(total: dict[str, float]) -> tuple[Share, ...]:
     return tuple(Share(name, p) for name, p in total.items() if p >= LEAST)
 
 
-def _sizes(found: Posterior[E]) -> dict[int, tuple[float, float]]:
-    """Mean and sigma of each member (SI) over the models that hold it."""
+def _sizes(found: Posterior[E], wanted: Sequence[int]) -> dict[int, tuple[float, float]]:
+    """Mean and sigma of each member (SI) over the models that hold it; of those that are wanted, and some others."""
+    missing = set(wanted)
     weight: dict[int, float] = {}
     first: dict[int, float] = {}
     second: dict[int, float] = {}
-    for model in found.models[:_MOST]:
+    for place, model in enumerate(found.models):
+        held = {k for k, _ in model.members}
+        if place >= _MOST and not missing & held:
+            continue
+        missing -= held
         near = found.board.data(model.noise)[1].at(model.members)
         for (k, _), mean, variance in zip(model.members, near.sizes.tolist(), near.variances.tolist(), strict=True):
             weight[k] = weight.get(k, 0.0) + model.probability
