@@ -91,8 +91,8 @@ MUTANTS = (
     ),
     Mutant(
         "joint/combine.py",
-        "        var_u = np.diagonal(inverse + gain",
-        "        var_u = np.diagonal(inverse - gain",
+        "        var_u = np.sum(inverse**2, axis=2) + np",
+        "        var_u = np.sum(inverse**2, axis=2) - np",
         (f"{TESTS}/joint",),
     ),
     Mutant("joint/set_board.py", "_Share(J - B.T @ X", "_Share(J + B.T @ X", (f"{TESTS}/joint/test_set_board.py",)),

@@ -169,11 +169,13 @@ def test_white_noise_has_no_memory(cut):
 
 
 @pytest.mark.timeout(60)
-def test_learning_ends_where_terms_come_and_go(cut, monkeypatch):
-    sure = replace(NoiseTerm("gyro", "flicker"), size=1.0, gain=100.0)
-    monkeypatch.setattr(learned_noise, "_best_sizes", lambda *_: [sure])
-    monkeypatch.setattr(learned_noise, "refined", lambda _i, _c, terms: tuple(terms)[-1:])
-    assert learn(drawn(cut, [], 1), cut) == (sure,)
+def test_learning_ends_with_the_likeliest_where_terms_come_and_go(cut, monkeypatch):
+    of_gyro, of_accel = (replace(NoiseTerm(triad, "flicker"), size=1.0, gain=100.0) for triad in TRIADS)
+    after = {"gyro": of_accel, "accel": of_gyro}
+    information = drawn(cut, [NoiseTerm("accel", "flicker", size=1.0)], 1)
+    monkeypatch.setattr(learned_noise, "_best_sizes", lambda *_: [of_gyro, of_accel])
+    monkeypatch.setattr(learned_noise, "refined", lambda _i, _c, terms: (after[terms[0].triad] if terms else of_gyro,))
+    assert learn(information, cut) == (of_accel,)
 
 
 def test_noise_of_one_triad_is_not_told_of_the_other(cut):

@@ -15,7 +15,7 @@ def estimated(data, sigma, prior):
 
 
 @pytest.mark.parametrize("sigma", [0.001, 0.3, 0.4])
-def test_a_prior_is_contradicted_by_the_distance_of_the_data_whatever_they_know(sigma):
+def test_a_prior_is_contradicted_by_the_distance_of_data_that_know_less_or_more_than_it(sigma):
     prior = np.full(2, 0.1)
     limit = 3.0 * np.hypot(sigma, prior[0])
     weight, estimate, covariance = estimated(np.array([0.95 * limit, 1.05 * limit]), np.full(2, sigma), prior)
@@ -29,12 +29,16 @@ def test_without_its_prior_a_coefficient_is_what_the_data_say():
     assert held_back(*estimated(data, sigma, np.full(2, 0.1)))[1] == pytest.approx(data)
 
 
-def test_data_that_know_far_less_than_the_prior_are_not_asked_what_they_say_without_it():
-    """What they say lies a thousand times beyond the prior, where no fit of one rest is linear."""
-    weight, estimate, covariance = estimated(np.array([12.0, 400.0]), np.full(2, 1.0), np.full(2, 0.1))
-    held, data = held_back(weight, estimate, covariance)
-    assert held.tolist() == [False, True]
-    assert data == pytest.approx(estimate)
+def test_the_less_the_data_know_the_more_it_takes_up_to_the_estimate_itself():
+    """What they say by themselves lies a thousand times beyond the prior, where no fit of one rest is linear."""
+    known, data = 0.1**-2.0, []
+    for share, least in ((0.0501, 0.67), (0.0499, 0.67), (0.01, 1.5), (1e-3, 3.0), (1e-6, 3.0)):
+        beyond = 0.1 * least * np.array([0.97, 1.03])
+        held, said = held_back(np.full(2, known), beyond, np.diag(np.full(2, (1.0 - share) / known)))
+        assert held.tolist() == [False, True], share
+        data.append(said[1])
+    assert data[1] == pytest.approx(data[0], rel=0.01)
+    assert data[-1] == pytest.approx(0.309)
 
 
 def test_what_the_data_do_not_show_contradicts_nothing():

@@ -99,3 +99,90 @@ def test_errors_are_as_large_as_their_sigmas(groups):
     np.testing.assert_allclose(rms[:V], theory, rtol=0.15)
     np.testing.assert_allclose(rms[V:], 1.0, rtol=0.15)
     assert np.sqrt(np.mean(np.square(own))) == pytest.approx(theory, rel=0.15)
+
+
+def drawn_set(rng):
+    """A set of any shape: few rows, columns of zeros, equal columns, no, one or two components at any places."""
+    size = int(rng.integers(1, 7))
+    columns = rng.permutation(size)[: rng.integers(0, size + 1)]
+    cut = int(rng.integers(0, len(columns) + 1))
+    components = [Component(n, c) for n, c in (("a", columns[:cut]), ("b", columns[cut:])) if len(c)]
+    groups = []
+    for _ in range(rng.integers(1, 5)):
+        A = rng.normal(size=(int(rng.integers(0, 9)), size))
+        A[:, rng.integers(size)] *= rng.choice([0.0, 1.0])
+        A[:, 0] = A[:, -1] if rng.random() < 0.3 else A[:, 0]
+        groups.append(Rows(A, 3.0 * rng.normal(size=len(A))))
+    return groups, np.exp(rng.normal(size=size)), components
+
+
+def all_at_once(groups, weight, components, tau):
+    """Estimate with every deviation as a parameter of sigma one, and the density of the data."""
+    varying = np.concatenate([np.empty(0, int), *(c.columns for c in components)]).astype(int)
+    size = np.concatenate([np.empty(0), *(np.full(len(c.columns), t) for c, t in zip(components, tau, strict=True))])
+    p, v = len(weight), len(varying)
+    blocks = [
+        np.hstack([g.A, *(g.A[:, varying] * size * (k == place) for k in range(len(groups)))])
+        for place, g in enumerate(groups)
+    ]
+    A, y = np.vstack(blocks), np.concatenate([g.y for g in groups])
+    prior = np.concatenate([weight, np.ones(v * len(groups))])
+    C = np.linalg.inv(A.T @ A + np.diag(prior))
+    x = C @ A.T @ y
+    S = A @ np.diag(1.0 / prior) @ A.T + np.eye(len(y))
+    density = 0.5 * (y @ y - y @ np.linalg.solve(S, y) - np.linalg.slogdet(S)[1] - np.log(weight).sum())
+    return (
+        x[:p],
+        C[:p, :p],
+        x[p:].reshape(len(groups), v) * size,
+        np.sqrt(np.diag(C)[p:]).reshape(len(groups), v) * size,
+        density,
+    )
+
+
+def test_a_set_of_any_shape_is_all_parameters_and_deviations_at_once():
+    rng = np.random.default_rng(31)
+    for _ in range(150):
+        groups, weight, components = drawn_set(rng)
+        tau = rng.choice([0.0, 0.1, 1.0, 1e3], size=len(components))
+        combined = Combination(groups, weight, components)
+        found = combined.estimate(tau)
+        x, C, u, sigma, density = all_at_once(groups, weight, components, tau)
+        np.testing.assert_allclose(found.values, x, atol=1e-6)
+        np.testing.assert_allclose(found.covariance, C, atol=1e-6)
+        np.testing.assert_allclose(found.deviation, u, atol=1e-5)
+        np.testing.assert_allclose(found.deviation_sigma, sigma, rtol=1e-6, atol=1e-6)
+        # Parameters have units of their own here, whose determinant is no part of the likelihood.
+        assert found.log_likelihood + np.log(combined.unit).sum() == pytest.approx(density, abs=1e-6)
+
+
+@pytest.mark.parametrize("weaker", [1e-2, 1e-4, 1e-6])
+def test_a_coefficient_that_one_power_on_knows_far_better_than_others_has_a_scatter_in_any_order(weaker):
+    rng = np.random.default_rng(0)
+    groups = []
+    for place in range(4):
+        A = 10.0 * rng.normal(size=(8, 4))
+        A[:, 0] *= weaker if place else 1.0
+        groups.append(Rows(A, A @ rng.normal(size=4) + rng.normal(size=8)))
+    few, all_of_them = Component("few", np.array([0])), Component("all", np.array([1]))
+    found = [
+        {t.effect: (t.sigma, t.high) for t in turn_on_scatter(Combination(groups, np.full(4, 0.01), order))}
+        for order in ([few, all_of_them], [all_of_them, few])
+    ]
+    assert found[0]["all"] == pytest.approx(found[1]["all"], rel=1e-2)
+    assert np.isfinite(found[0]["all"]).all()
+
+
+def test_a_coefficient_that_one_power_on_alone_sees_has_a_scatter_without_a_bound():
+    rng = np.random.default_rng(0)
+    groups = []
+    for place in range(4):
+        A = 10.0 * rng.normal(size=(8, 4))
+        A[:, 0] *= place == 0
+        A[:, 1] = 0.0
+        groups.append(Rows(A, rng.normal(size=8)))
+    one, none = (
+        turn_on_scatter(Combination(groups, np.full(4, 0.01), [Component("a", np.array([k]))]))[0] for k in (0, 1)
+    )
+    assert np.isfinite(one.sigma)
+    assert (none.sigma, none.low, none.high) == (0.0, 0.0, np.inf)

@@ -110,7 +110,7 @@ class Information:
         from scipy.linalg import lapack  # noqa: PLC0415 (0.2 s that a single recording does not need)
 
         A = self.J + np.diag(weight)
-        if np.diag(A).min() <= 0.0:
+        if not np.diag(A).min(initial=1.0) > 0.0:
             return -float("inf")
         scale = 1.0 / np.sqrt(np.diag(A))
         root, failed = lapack.dpotrf(A * np.outer(scale, scale), lower=1)

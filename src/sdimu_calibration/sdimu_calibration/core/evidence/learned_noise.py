@@ -29,7 +29,18 @@ from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
 from sdimu_calibration.core.evidence.noise_root import folded, own_columns, root_of, times
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.evidence.tridiagonal import Tridiagonal
-from sdimu_calibration.core.noise_term import FLICKER, KINDS, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.noise_term import (
+    FLICKER,
+    KINDS,
+    MARKOV,
+    RANDOM_WALK,
+    SHIFT,
+    STOP,
+    TRIADS,
+    TURN,
+    Identity,
+    NoiseTerm,
+)
 from sdimu_calibration.core.side_by_side import side_by_side
 
 LEAST_GAIN = 5.0
@@ -214,13 +225,14 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
         Terms to begin with.
     """
     terms = refined(information, cut, start)
-    tried, seen = kinds(cut), set[frozenset[tuple[str, str, float]]]()
+    tried, seen = kinds(cut), dict[frozenset[Identity], tuple[NoiseTerm, ...]]()
     while True:
-        # Terms that come and go would never end: about a fit that is far off, sizes are not what they are alone.
-        which = frozenset((t.triad, t.kind, t.tau) for t in terms)
+        which = frozenset(t.identity for t in terms)
         if which in seen:
-            return _tuned(information, cut, terms)
-        seen.add(which)
+            # Terms come and go: about a fit that is far off, sizes are not what they are alone.
+            likeliest = max(seen.values(), key=lambda some: likelihood(information, cut, some))
+            return _tuned(information, cut, likeliest)
+        seen[which] = terms
         given = given_terms(information, cut, terms)
         options = [
             size

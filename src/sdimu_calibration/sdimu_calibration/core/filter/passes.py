@@ -341,8 +341,9 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
     """Tell the coefficients whose data are far beyond their prior and that it holds back, and what the data say.
 
     The prior p and what the data say by themselves d differ by ``d / sqrt(sigma_d^2 + sigma_p^2)`` sigmas, which of an
-    estimate x of variance v is ``x / (sigma_p sqrt(1 - v / sigma_p^2))``: where the data know less than the prior, the
-    estimate stays near it however far they are.
+    estimate x of variance v is ``x / (sigma_p sqrt(s))``, s = 1 - v / sigma_p^2 the share of the data: where they know
+    less than the prior, the estimate stays near it however far they are. Below a share of `_LEAST_SHARE` its square
+    over s stands in the place of s: the less the data know, the more it takes, up to the estimate itself.
 
     Parameters
     ----------
@@ -358,11 +359,11 @@ def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: flo
     -------
     held : ndarray of bool, shape (p,)
     data : ndarray, shape (p,)
-        Each coefficient without its own prior (SI); the estimate itself where the data hardly know it.
+        Each coefficient without its own prior (SI), the prior left in by as much as the data hardly know it.
     """
     size, variance = np.abs(estimate), np.diag(covariance)
-    of_data = 1.0 - weight * variance
-    of_data = np.where(of_data > _LEAST_SHARE, of_data, 1.0)
+    share = np.maximum(1.0 - weight * variance, _LEAST_SHARE**2)
+    of_data = np.where(share > _LEAST_SHARE, share, _LEAST_SHARE**2 / share)
     # An estimate that is far beyond its prior is so in any noise.
     beyond = size * np.sqrt(weight) > _BEYOND * np.minimum(scatter * np.sqrt(of_data), 1.0)
     return beyond & (size * np.sqrt(variance) * weight > _PULL), estimate / of_data

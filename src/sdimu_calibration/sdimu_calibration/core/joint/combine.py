@@ -119,10 +119,13 @@ class Combination:
         return np.asarray(np.repeat(tau, counts) / self.unit[self.varying])
 
     def resolution(self, component: int) -> float:
-        """Typical sigma (SI) with which one power-on alone tells the deviation of a component's coefficient."""
+        """Typical sigma (SI) with which one power-on alone tells the deviation of a component's coefficient.
+
+        Of the power-ons that see it at all; infinite where none does.
+        """
         columns = self.components[component].columns
         J = np.sum((self.A[:, :, columns] / self.unit[columns]) ** 2, axis=1)
-        return float(np.median(1.0 / np.sqrt(np.maximum(J, 1e-300))))
+        return float(np.median(1.0 / np.sqrt(J[J > 0.0]))) if J.any() else float("inf")
 
     def log_likelihood(self, tau: Floats) -> float:
         """Restricted log-likelihood of the sigmas.
@@ -153,21 +156,23 @@ class Combination:
         return self._reduced(tau)[:2]
 
     def _reduced(self, tau: Floats) -> tuple[float, Information, Floats, Floats]:
-        """Integrate as `integrated` does; S^-1 [A y] of each power-on and R D besides.
+        """Integrate as `integrated` does; the factor U of each power-on and its rows U u = b - B theta besides.
 
-        S = I + R D^2 R' is the covariance of the rows that see the deviations, R their varying columns. The sum of
-        squares that S^-1 makes of A stays positive for every size; a difference of informations would not.
+        Rows ``R D u + A theta = y`` of the deviations u, each of sigma one, and ``u = 0`` below them: a QR
+        decomposition leaves the rows of u, and rows of theta alone. Differences of informations, and the covariance
+        ``I + R D^2 R'``, lose to rounding what few power-ons know where D is large.
         """
         R = self.A[:, :, self.varying] * self.sizes(tau)
-        S = np.eye(R.shape[1]) + R @ np.swapaxes(R, 1, 2)
-        rows = np.concatenate([self.A, self.y[:, :, None]], axis=2)
-        root = np.linalg.cholesky(S)
-        white = np.linalg.solve(root, rows)
-        A, y = white[:, :, :-1].reshape(-1, len(self.unit)), white[:, :, -1].ravel()
-        seen = 0.5 * (float(np.sum(self.y**2)) - float(y @ y))
-        constant = seen - float(np.log(np.diagonal(root, axis1=1, axis2=2)).sum())
-        information = Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y)
-        return constant, information, np.linalg.solve(np.swapaxes(root, 1, 2), white), R
+        v = R.shape[2]
+        rows = np.concatenate([R, self.A, self.y[:, :, None]], axis=2)
+        prior = np.zeros_like(rows)
+        prior[:, range(v), range(v)] = 1.0
+        T = np.asarray(np.linalg.qr(np.concatenate([rows, prior], axis=1), mode="r"))
+        U, first, rest = T[:, :v, :v], T[:, :v, v:], T[:, v:, v:]
+        A, y = rest[:, :, :-1].reshape(-1, len(self.unit)), rest[:, :, -1].ravel()
+        determinant = np.log(np.abs(np.diagonal(U, axis1=1, axis2=2))).sum()
+        constant = 0.5 * float(np.sum(first[:, :, -1] ** 2)) - float(determinant)
+        return constant, Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y), U, first
 
     def estimate(self, tau: Floats) -> JointEstimate:
         """Estimate all parameters and deviations, the sigmas given.
@@ -177,15 +182,15 @@ class Combination:
         tau : ndarray, shape (c,)
             Sigma of each component (SI).
         """
-        constant, information, weighed, R = self._reduced(tau)
+        constant, information, U, first = self._reduced(tau)
         likelihood = constant + information.log_likelihood(self.weight)
         everything = np.arange(len(self.unit))
         values, covariance = information.estimate(everything, self.weight)
-        gain = np.swapaxes(R, 1, 2) @ weighed
+        inverse = np.linalg.inv(U)
+        gain = inverse @ first
         u = gain[:, :, -1] - gain[:, :, :-1] @ values
-        alone = np.linalg.inv(np.eye(R.shape[2]) + np.swapaxes(R, 1, 2) @ R)
         spread = gain[:, :, :-1] @ covariance @ np.swapaxes(gain[:, :, :-1], 1, 2)
-        var_u = np.diagonal(alone + spread, axis1=1, axis2=2)
+        var_u = np.sum(inverse**2, axis=2) + np.diagonal(spread, axis1=1, axis2=2)
         unit = self.unit[self.varying] * self.sizes(tau)
         return JointEstimate(
             values * self.unit, covariance * np.outer(self.unit, self.unit), u * unit, np.sqrt(var_u) * unit, likelihood

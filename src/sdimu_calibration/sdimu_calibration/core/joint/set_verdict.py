@@ -84,7 +84,7 @@ class SetFacts:
 
     @property
     def is_of_some(self) -> bool:
-        """Whether some recordings have large errors that noise of theirs takes in, and others neither of the two."""
+        """Whether some recordings have large errors that noise takes in, and others small ones and no noise."""
         loud = [worst_figure(r) > MISFIT for r in self.fit.reports]
         taken_in = [is_loud and may_be_an_effect(r.noise) for is_loud, r in zip(loud, self.fit.reports, strict=True)]
         quiet = [not is_loud and not r.noise for is_loud, r in zip(loud, self.fit.reports, strict=True)]

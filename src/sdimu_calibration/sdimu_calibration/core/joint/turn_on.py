@@ -38,7 +38,7 @@ def turn_on_scatter(combined: Combination) -> tuple[TurnOn, ...]:
         Of two power-ons at least.
     """
     scale = np.array([combined.resolution(k) for k in range(len(combined.components))])
-    tau = scale.copy()
+    tau = np.where(np.isfinite(scale), scale, 0.0)
     for _ in range(_SWEEPS if len(tau) > 1 else 1):
         for k in range(len(tau)):
             tau[k] = _best(combined, tau, k, scale[k])
@@ -96,6 +96,8 @@ def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
     """Sigma (SI) of one component that the others leave most likely; 0 where none is likelier."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 (0.2 s that a single recording does not need)
 
+    if not np.isfinite(scale):
+        return 0.0
     grid = np.log(scale * np.geomspace(_SMALLEST, _LARGEST, _GRID))
     values = [_profile(combined, tau, k, float(np.exp(x))) for x in grid]
     top = int(np.argmax(values))
@@ -113,6 +115,9 @@ def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
 def _with_interval(combined: Combination, tau: Floats, k: int, scale: float) -> TurnOn:
     from scipy.optimize import brentq  # noqa: PLC0415
 
+    effect = combined.components[k].effect
+    if not np.isfinite(scale):
+        return TurnOn(effect, 0.0, 0.0, float("inf"), len(combined.y))
     limit = _profile(combined, tau, k, tau[k]) - _FALL
 
     def above(x: float) -> float:
@@ -124,5 +129,4 @@ def _with_interval(combined: Combination, tau: Floats, k: int, scale: float) -> 
     if tau[k] > 0.0 and begin > bottom and above(bottom) < 0.0:
         low = float(np.exp(brentq(above, bottom, begin, xtol=1e-3)))
     high = float(np.exp(brentq(above, begin, end, xtol=1e-3))) if above(end) < 0.0 else float("inf")
-    effect = combined.components[k].effect
     return TurnOn(effect, float(tau[k]), low, high, len(combined.y))

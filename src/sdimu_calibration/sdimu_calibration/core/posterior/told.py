@@ -135,13 +135,15 @@ def _shares(total: dict[str, float]) -> tuple[Share, ...]:
 
 
 def _sizes(found: Posterior[E], wanted: Sequence[int]) -> dict[int, tuple[float, float]]:
-    """Mean and sigma of each member (SI) over the models that hold it; of those that are wanted, and some others."""
+    """Mean and sigma of each member (SI) over the likely models that hold it, else in the likeliest that does."""
     missing = set(wanted)
     weight: dict[int, float] = {}
     first: dict[int, float] = {}
     second: dict[int, float] = {}
     for place, model in enumerate(found.models):
         held = {k for k, _ in model.members}
+        if place >= _MOST and not missing:
+            break
         if place >= _MOST and not missing & held:
             continue
         missing -= held
