@@ -17,7 +17,9 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
+from sdimu_calibration.core.noise_term import FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
@@ -154,6 +156,30 @@ def test_a_set_whose_search_came_to_no_end_is_not_called_consistent(summary):
     assert verdict_of_set(SetFacts([], after, fit, None, None)) == Verdict.UNEXPLAINED
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.9, (), ()))) == Verdict.CONSISTENT
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.4, (), ()))) == Verdict.CLASS_OF_EFFECTS
+
+
+def report_of(nis, *kinds):
+    """A report with this NIS in white noise, of 1 in noise of these kinds that it learned."""
+    noise = tuple(NoiseTerm("gyro", kind, size=1.0) for kind in kinds)
+    in_noise = 1.0 if kinds else None
+    return SimpleNamespace(noise=noise, statistics=FitStatistics(0.0, nis, 100.0, 3.0, nis_in_noise=in_noise))
+
+
+@pytest.mark.parametrize(
+    ("reports", "word"),
+    [
+        ((report_of(5.0, STOP), report_of(1.0)), Verdict.UNEXPLAINED),
+        # Both are loud: the one has learned no noise, but it is no recording without an error.
+        ((report_of(5.0, STOP), report_of(5.0)), Verdict.CONSISTENT),
+        ((report_of(5.0, STOP), report_of(5.0, STOP)), Verdict.CONSISTENT),
+        # What data sheets know takes in the noise of its own.
+        ((report_of(5.0, FLICKER), report_of(1.0)), Verdict.CONSISTENT),
+    ],
+)
+def test_a_set_of_a_loud_and_a_quiet_recording_is_unexplained(summary, reports, word):
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
+    fit = SimpleNamespace(function=None, reports=reports)
+    assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.9, (), ()))) == word
 
 
 def test_a_coefficient_of_one_recording_is_named_with_it():

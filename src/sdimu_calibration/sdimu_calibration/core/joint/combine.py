@@ -95,11 +95,11 @@ class Combination:
         squares = sum(np.sum(g.A**2, axis=0) for g in groups)
         # In units in which every parameter has an information of one: SI units differ by many orders.
         self.unit = 1.0 / np.sqrt(squares + weight)
-        self.A = np.stack([one.varying.A * self.unit for one in own])
-        self.y = np.stack([one.varying.y for one in own])
-        rest = [one.rest.A * self.unit for one in own]
-        self.J_rest = np.asarray(sum(A.T @ A for A in rest))
-        self.d_rest = np.asarray(sum(A.T @ one.rest.y for A, one in zip(rest, own, strict=True)))
+        self.A = np.stack([seeing.A * self.unit for seeing, _ in own])
+        self.y = np.stack([seeing.y for seeing, _ in own])
+        rest = stacked([others for _, others in own])
+        self.J_rest = (rest.A * self.unit).T @ (rest.A * self.unit)
+        self.d_rest = (rest.A * self.unit).T @ rest.y
         self.weight = weight * self.unit**2
 
     def sizes(self, tau: Floats) -> Floats:
@@ -197,16 +197,8 @@ class Combination:
         )
 
 
-@dataclass(frozen=True)
-class _Split:
-    """Rows of a power-on of which the first alone see what varies: as many as vary."""
-
-    varying: Rows
-    rest: Rows
-
-
-def _varying_first(rows: Rows, varying: Ints) -> _Split:
-    """Turn the rows of a power-on by a QR decomposition that begins with the varying columns."""
+def _varying_first(rows: Rows, varying: Ints) -> tuple[Rows, Rows]:
+    """Turn the rows of a power-on so that the first, as many as vary, alone see what varies; those, and the others."""
     v, P = len(varying), rows.A.shape[1]
     order = np.concatenate([varying, np.setdiff1d(np.arange(P), varying)])
     R: Floats = np.asarray(np.linalg.qr(np.column_stack([rows.A[:, order], rows.y]), mode="r"))
@@ -214,4 +206,4 @@ def _varying_first(rows: Rows, varying: Ints) -> _Split:
     first, rest = np.zeros((v, P + 1)), np.asarray(R[v:P])
     first[: min(v, len(R))] = R[:v]
     back: Ints = np.argsort(order)
-    return _Split(Rows(first[:, back], first[:, P]), Rows(rest[:, back], rest[:, P]))
+    return Rows(first[:, back], first[:, P]), Rows(rest[:, back], rest[:, P])

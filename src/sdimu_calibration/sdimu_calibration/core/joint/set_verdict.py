@@ -85,10 +85,9 @@ class SetFacts:
     @property
     def is_of_some(self) -> bool:
         """Whether some recordings have large errors that noise takes in, and others small ones and no noise."""
-        loud = [worst_figure(r) > MISFIT for r in self.fit.reports]
-        taken_in = [is_loud and may_be_an_effect(r.noise) for is_loud, r in zip(loud, self.fit.reports, strict=True)]
-        quiet = [not is_loud and not r.noise for is_loud, r in zip(loud, self.fit.reports, strict=True)]
-        return any(taken_in) and any(quiet)
+        loud = [r.noise for r in self.fit.reports if worst_figure(r) > MISFIT]
+        quiet = [r.noise for r in self.fit.reports if worst_figure(r) <= MISFIT]
+        return any(map(may_be_an_effect, loud)) and any(not noise for noise in quiet)
 
     @property
     def comes_back(self) -> bool:
