@@ -29,8 +29,8 @@ VERSIONS = ("v7", "v7.3")
 
 @pytest.fixture(scope="module")
 def hand():
-    """Eight attitudes by hand at 100 Hz."""
-    return by_hand_recording(ByHand(8, load_imu("mems_by_hand"), load_site("daejeon"), seed=3))[0]
+    """Eight attitudes by hand at 25 Hz."""
+    return by_hand_recording(ByHand(8, load_imu("mems_by_hand"), load_site("daejeon"), seed=3, rate_hz=25.0))[0]
 
 
 def cells(*values):
