@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,7 +45,7 @@ def world(case: NoiseCase, seed: int) -> OneTest:
     rng, imu = rng_of(seed, case.imu, case.kind), load_imu(case.imu)
     plan, site = drawn_place(rng)
     noise = () if case.kind == WHITE else drawn_noise(imu, case.kind, rng)
-    true = [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
+    true = noise_terms(noise)
     span = (case.sigmas, case.sigmas)
 
     def simulated(effects: tuple[str, ...], noise: tuple[str, ...] = noise) -> Any:
@@ -101,6 +102,11 @@ def drawn_noise(imu: ImuSpecification, kind: str, rng: np.random.Generator) -> t
         tau = f"(tau={float(np.exp(rng.uniform(*np.log(_TAUS_S)))):.0f} s)" if kind == "markov" else ""
         out.append(f"{triad}_noise_{kind}{tau}={float(from_si(size, shown)):.5g} {shown}")
     return tuple(out)
+
+
+def noise_terms(noise: Sequence[str]) -> list[NoiseTerm]:
+    """Noise of a scenario as terms of the estimator, with their true sizes."""
+    return [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
 
 
 def _seen(g: Group) -> str:

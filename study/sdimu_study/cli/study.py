@@ -36,10 +36,12 @@ def adaptive(
     out: Annotated[Path, typer.Option(help="Folder of runs, adaptive.json, adaptive.md.")] = Path("out/study-adaptive"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each kind.")] = 50,
     seed: Seed = 90_001,
-    kind: Annotated[list[str] | None, typer.Option(help="table33, clean, hidden; repeatable. All by default.")] = None,
+    kind: Annotated[
+        list[str] | None, typer.Option(help="table33, clean, hidden, wide, 'wide hidden'; repeatable. All by default.")
+    ] = None,
     plan: Annotated[list[str] | None, typer.Option(help="Fixed plan beside it; repeatable.")] = None,
-    imu: Imu = "dtg",
-    site: Place = "daejeon",
+    imu: Annotated[str, typer.Option(help="IMU file; the wide tests take all of config/imu for a table.")] = "dtg",
+    site: Annotated[str, typer.Option(help="Site; the wide tests draw theirs.")] = "daejeon",
     workers: Workers = 2,
 ) -> None:
     """Let tests choose their turns: minutes to the limits, do the sigmas hold, is a hidden effect told apart."""
@@ -48,14 +50,20 @@ def adaptive(
 
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
     from sdimu_calibration.storage.files.goal_file import load_goals
-    from sdimu_study.adaptive import FIXED, GOALS, KINDS, STUDY, AdaptiveCase, fixed_minutes, page
+    from sdimu_study.adaptive import FIXED, GOALS, KINDS, STUDY, AdaptiveCase, WideCase, fixed_minutes, page
     from sdimu_study.hidden_draw import sizes
+    from sdimu_study.worlds import HANDHELD
 
     check_kinds(kind, KINDS)
     place, sensor, model = load_site(site), load_imu(imu), load_model("baseline")
     seen = sizes("kim18", math.degrees(place.latitude_rad), sensor, model)
-    goals = {name: load_goals("table33" if name == "table33" else "kim18") for name in kind or KINDS}
-    cases = {(name,): AdaptiveCase(name, sensor, place, model, goals[name], seen) for name in goals}
+    cases: dict[Key, AdaptiveCase | WideCase] = {}
+    for name in kind or KINDS:
+        if name.startswith("wide"):
+            cases |= {(name, of): WideCase(of, name == "wide hidden") for of in imu_files(None, HANDHELD)}
+        else:
+            goals = load_goals("table33" if name == "table33" else "kim18")
+            cases[(name,)] = AdaptiveCase(name, sensor, place, model, goals, seen)
     results = conduct(STUDY, cases, range(seed, seed + runs), out, workers)
     fixed = {p: {g: fixed_minutes(p, g, place, sensor, model) for g in GOALS} for p in plan or FIXED}
     leave(out / "adaptive", results, page(results, fixed, seed))
