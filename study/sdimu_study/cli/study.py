@@ -40,7 +40,7 @@ def adaptive(
         list[str] | None, typer.Option(help="table33, clean, hidden, wide, 'wide hidden'; repeatable. All by default.")
     ] = None,
     plan: Annotated[list[str] | None, typer.Option(help="Fixed plan beside it; repeatable.")] = None,
-    imu: Annotated[str, typer.Option(help="IMU file; the wide tests take all of config/imu for a table.")] = "dtg",
+    imu: Annotated[str, typer.Option(help="IMU file; the wide tests take four grades.")] = "dtg",
     site: Annotated[str, typer.Option(help="Site; the wide tests draw theirs.")] = "daejeon",
     workers: Workers = 2,
 ) -> None:
@@ -50,9 +50,8 @@ def adaptive(
 
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
     from sdimu_calibration.storage.files.goal_file import load_goals
-    from sdimu_study.adaptive import FIXED, GOALS, KINDS, STUDY, AdaptiveCase, WideCase, fixed_minutes, page
+    from sdimu_study.adaptive import FIXED, GOALS, IMUS, KINDS, STUDY, AdaptiveCase, WideCase, fixed_minutes, page
     from sdimu_study.hidden_draw import sizes
-    from sdimu_study.worlds import HANDHELD
 
     check_kinds(kind, KINDS)
     place, sensor, model = load_site(site), load_imu(imu), load_model("baseline")
@@ -60,7 +59,7 @@ def adaptive(
     cases: dict[Key, AdaptiveCase | WideCase] = {}
     for name in kind or KINDS:
         if name.startswith("wide"):
-            cases |= {(name, of): WideCase(of, name == "wide hidden") for of in imu_files(None, HANDHELD)}
+            cases |= {(name, of): WideCase(of, name == "wide hidden") for of in IMUS}
         else:
             goals = load_goals("table33" if name == "table33" else "kim18")
             cases[(name,)] = AdaptiveCase(name, sensor, place, model, goals, seen)
