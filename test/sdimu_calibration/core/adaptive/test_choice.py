@@ -13,9 +13,13 @@ from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
 from sdimu_calibration.core.adaptive.worth import worth
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.goal_file import load_goals
+from sdimu_sim.core.scenario import Scenario, generate
 
 from .conftest import ACCELERATION, part, perfect_fit
 
@@ -274,3 +278,14 @@ def test_a_limit_of_what_is_estimated_along_but_not_in_the_model_counts_for_noth
 def test_limits_of_nothing_in_the_model_are_refused(first_stop):
     with pytest.raises(DataError, match="accel_cubic"):
         fitted(first_stop, Goals("other", {"accel_cubic": 1.0}, 30.0))
+
+
+def test_gyros_that_do_not_see_the_earth_choose_no_turn():
+    site, imu = load_site("daejeon"), load_imu("mems_consumer")
+    plan = replace(BOTH_SENSES, dwell_s=(10.0,) * 6)
+    recording, _ = generate(Scenario(plan, imu, site, rate_hz=20.0, seed=5))
+    fit = solve(PreparedTest(recording, imu, site), load_model("hand"), learn=False)
+    with pytest.raises(
+        DataError, match=r"let the table run a plan instead \(the gyros' white noise .* hides the Earth"
+    ):
+        fitted(fit, GOALS)

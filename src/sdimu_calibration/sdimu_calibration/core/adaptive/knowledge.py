@@ -74,9 +74,9 @@ def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[st
     beyond the one that was given.
     """
     if not isinstance(fit, NavigationFit):
-        raise DataError(
-            f"a {fit.estimator} fit says nothing of the next turn of a table: choose another {Option.ESTIMATOR}"
-        )
+        why = fit.test.why_handheld
+        do = f"let the table run a plan instead ({why})" if why else f"choose another {Option.ESTIMATOR}"
+        raise DataError(f"a {fit.estimator} fit says nothing of the next turn of a table: {do}")
     along = alike or _to_tell(fit, goals)
     at = so_far(fit, along, _ROOM, _hiding(fit, along) if goals.both_senses else ())
     limited, limit = goals.of(fit.names, fit.model.body_frame)
