@@ -132,6 +132,16 @@ class Producer:
             return NO_LIMIT
         return min(reached) + self._window_ns
 
+    def allows(self, stamp_ns: int) -> bool:
+        """Whether a message of a stamp may be sent now: within the window, or the first after a pause in the data.
+
+        Where every consumer holds all that was sent, no further credit would come to end the pause.
+        """
+        level = self._sent_ns is not None and all(
+            peer.reached_ns is not None and peer.reached_ns >= self._sent_ns for peer in self._peers.values()
+        )
+        return level or stamp_ns <= self.limit_ns
+
     def publish(self, message: Any, stamp_ns: int) -> None:
         """Send a message (or its CDR bytes); wait while DDS refuses because a reader is slow or was killed."""
         publish(self.publisher, message)

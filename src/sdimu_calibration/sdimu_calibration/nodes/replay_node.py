@@ -103,7 +103,7 @@ class ReplayNode:
                 self._farewell()
                 return
             stamp, topic, message = self._queue[self._next]
-            if stamp > self._imu.limit_ns:
+            if not self._imu.allows(stamp):
                 return
             if self._speed > 0.0 and (stamp - self._first_ns) / NS > self._speed * (time.monotonic() - self._begun):
                 return
