@@ -12,8 +12,10 @@ import pytest
 from rosbags.rosbag2 import Reader
 
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_info import read_info
 from sdimu_calibration.storage.bags.bag_reader import read_recording
+from sdimu_calibration.storage.bags.mcap_bag import McapBag
 from sdimu_calibration.storage.bags.recover import recover
 
 KILLED = """
@@ -113,3 +115,23 @@ def test_info_of_a_cut_bag_counts_what_is_whole_and_names_the_damage(bag):
     assert whole.damaged == []
     assert cut.damaged == [file]
     assert cut.counts == whole.counts
+
+
+def test_a_bag_that_is_being_written_is_neither_mended_nor_replaced_and_loses_nothing(tmp_path):
+    path = tmp_path / "live"
+    ns = (np.arange(200) + 1) * 10_000_000
+    messages = cdr.encode_imu(ns, np.zeros((200, 3)), np.ones((200, 3)))
+    recorder = McapBag(path, live=True)
+    recorder.topic("/imu/data_raw", cdr.IMU)
+    for k, message in enumerate(messages):
+        recorder.write("/imu/data_raw", message, int(ns[k]))
+        if k == 100:
+            recorder.flush()
+            with pytest.raises(DataError, match=r"live_0\.mcap: is being written"):
+                recover(path)
+            with pytest.raises(DataError, match=r"live_0\.mcap: is being written"):
+                McapBag(path, replace=True, live=True)
+    recorder.close()
+    assert sorted(file.name for file in path.iterdir()) == ["live_0.mcap", "metadata.yaml"]
+    assert len(read_recording(path).t) == 200
+    assert not recover(path)[0].damage

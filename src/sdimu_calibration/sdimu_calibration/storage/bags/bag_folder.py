@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, named_files, read_metadata
+from sdimu_calibration.storage.bags.being_written import held
 from sdimu_calibration.storage.files.whole_file import beside, same_file, uninterrupted
 
 DAMAGED_SUFFIX = ".damaged"
@@ -29,7 +30,10 @@ def file_states(path: Path) -> tuple[FileState, ...]:
 
 
 def check_room(path: Path, replace: bool) -> None:
-    """Raise DataError unless a bag can be made at `path`: nothing is there, or a bag alone that is to be replaced."""
+    """Raise DataError unless a bag can be made at `path`: nothing is there, or a bag alone that is to be replaced.
+
+    A bag that is still being written is none: its recorder would go on in a file that no folder names any more.
+    """
     if path.is_file():
         raise DataError(f"{path}: a file is in the way of the bag folder; choose another one")
     if not path.is_dir() or not any(path.iterdir()):
@@ -42,6 +46,8 @@ def check_room(path: Path, replace: bool) -> None:
     if others:
         shown = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
         raise DataError(f"{path}: holds more than a bag ({shown}); move that away, or choose another folder")
+    with held(file for file in sorted(path.iterdir()) if file.is_file()):
+        pass
 
 
 def check_apart(source: Path | Iterable[Path], target: Path) -> None:

@@ -13,6 +13,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_file import bag_parts, check_magic
 from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
 from sdimu_calibration.storage.bags.bag_metadata import FileEntry, TopicEntry, custom_data, write_metadata
+from sdimu_calibration.storage.bags.being_written import held
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.mcap_walk import DamagedError, McapWalk
 from sdimu_calibration.storage.files.whole_file import beside, free_beside, uninterrupted
@@ -42,7 +43,8 @@ class Salvage:
 def recover(path: Path) -> tuple[Salvage, ...]:
     """Mend a bag in place: rewrite every cut file up to the cut, and make metadata.yaml anew.
 
-    The cut file stays beside the mended one with ``.damaged`` at its name, and a number where that name is taken.
+    The cut file stays beside the mended one with ``.damaged`` at its name, and a number where that name is taken. A bag
+    that is still being written is refused: its recorder would go on in the file that was set aside.
 
     Parameters
     ----------
@@ -59,10 +61,11 @@ def recover(path: Path) -> tuple[Salvage, ...]:
         if part.suffix != ".mcap":
             raise DataError(f"{part}: only MCAP files can be mended; unpack a packed one first (zstd -d FILE)")
         check_magic(part)
-    salvages = tuple(_mend(part) for part in parts)
     folder = parts[0].parent
-    if Path(path).is_dir() or (folder / "metadata.yaml").is_file():
-        _rebuild_metadata(folder, salvages)
+    with held(parts):
+        salvages = tuple(_mend(part) for part in parts)
+        if Path(path).is_dir() or (folder / "metadata.yaml").is_file():
+            _rebuild_metadata(folder, salvages)
     return salvages
 
 
