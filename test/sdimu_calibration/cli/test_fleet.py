@@ -173,3 +173,11 @@ def test_correlations_come_back_to_a_half_step():
 @pytest.mark.parametrize("text", ["", "not base64!", "AAAA"])
 def test_correlations_that_are_none_are_none(text):
     assert unpacked(text, 7) is None
+
+
+def test_priors_are_added_to_an_imu_file_alone(batch, tmp_path):
+    folder = batch(units=3)
+    (tmp_path / "plan.yaml").write_text("format: sdimu-imu/1\nname: no noise\n")
+    with pytest.raises(DataError, match=r"plan\.yaml: noise: missing key"):
+        fleet([folder], imu=str(tmp_path / "plan.yaml"), priors=tmp_path / "own.yaml")
+    assert not (tmp_path / "own.yaml").exists()

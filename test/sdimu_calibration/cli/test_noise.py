@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.cli.noise import noise
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.noise import with_measured_noise
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.bags.bag_reader import read_recording
@@ -72,3 +73,10 @@ def test_estimated_noise_replaces_that_of_the_specification_and_says_so(still: P
     imu, note = with_measured_noise(load_imu("dtg"), recording)
     assert imu.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
     assert "0.1 as specified" in note
+
+
+def test_grade_and_priors_are_taken_from_an_imu_file_alone(still: Path, tmp_path: Path) -> None:
+    (tmp_path / "other.yaml").write_text("format: sdimu-imu/1\nname: no noise\n")
+    with pytest.raises(DataError, match=r"other\.yaml: noise: missing key"):
+        noise(still, imu=str(tmp_path / "other.yaml"), out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -32,10 +32,13 @@ def fleet(
     from sdimu_calibration.report.fleet import tables
     from sdimu_calibration.report.fleet.page import display_units, headline, write_page
     from sdimu_calibration.storage.bags.file_room import check_file_room
+    from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.fleet_file import write_fleet, write_priors
     from sdimu_calibration.storage.files.fleet_folder import as_measured, candidates, gather
 
     console = plain(stderr=as_json)
+    if imu is not None:
+        load_imu(imu)
     if priors is not None:
         read = [path for folder in folders for path in ([folder] if folder.is_file() else folder.rglob("*.json"))]
         check_file_room(priors, "--priors", replace=replace, sources=read)

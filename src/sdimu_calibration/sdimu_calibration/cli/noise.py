@@ -43,14 +43,17 @@ def noise(
     from sdimu_calibration.report.noise import HEAD, misfits, write_page
     from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.bags.file_room import check_own_file
-    from sdimu_calibration.storage.files.config import find_config, load_site
+    from sdimu_calibration.storage.files.config import find_config, load_imu, load_site
     from sdimu_calibration.storage.files.imu_file import write_measured_imu
     from sdimu_calibration.storage.files.noise_terms_file import write_noise_terms
     from sdimu_calibration.storage.opening import open_recording
 
     # Errors in files are reported before the work.
     folder = out or default_folder(bag, "noise")
-    stated = [] if opening.imu is None else [find_config("imu", opening.imu)]
+    stated = []
+    if opening.imu is not None:
+        load_imu(opening.imu)
+        stated = [find_config("imu", opening.imu)]
     check_own_file(folder / "imu.yaml", (f"# {MEASURED}",), stated)
     site = None if opening.site is None else load_site(opening.site)
     recording = open_recording(bag, opening.source)

@@ -415,6 +415,14 @@ def load_plan(name_or_path: str | Path) -> Plan:
     return plan
 
 
+def imu_mapping(name_or_path: str | Path) -> dict[str, Any]:
+    """Content of an IMU file as it is written, for a copy with other numbers; DataError where it is no IMU file."""
+    path = find_config("imu", name_or_path)
+    content = read_mapping(path)
+    check(content, _ImuFile, str(path))
+    return content
+
+
 def load_imu(name_or_path: str | Path) -> ImuSpecification:
     """Read an IMU's specification; priors come in SI, with their units for `imu_model.build` to check."""
     path = find_config("imu", name_or_path)

@@ -19,7 +19,7 @@ from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.storage.files.config import find_config, read_mapping
+from sdimu_calibration.storage.files.config import find_config, imu_mapping
 from sdimu_calibration.storage.files.fleet_folder import Gathered
 from sdimu_calibration.storage.files.json_file import entry
 from sdimu_calibration.storage.files.result_file import PATHS
@@ -149,7 +149,7 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
     units = {of[name]: unit for name, unit in zip(first.names, first.display_units, strict=True)}
     sizes = population_priors(done.inside, of)
     priors = {effect: f"{from_si(size, units[effect]):.3g} {units[effect]}" for effect, size in sizes.items()}
-    content = dict(read_mapping(source))
+    content = imu_mapping(source)
     content["name"] = path.stem
     content["prior"] = {**content.get("prior", {}), **priors}
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

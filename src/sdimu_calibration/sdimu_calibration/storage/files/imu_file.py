@@ -11,7 +11,7 @@ import yaml
 from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
 from sdimu_calibration.core.noise.white import white_beside
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.storage.files.config import find_config, read_mapping
+from sdimu_calibration.storage.files.config import imu_mapping
 from sdimu_calibration.storage.files.whole_file import write_whole
 
 GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
@@ -43,7 +43,7 @@ def write_measured_imu(
     remarks : sequence of str
         Comments for the head of the file.
     """
-    content = dict(read_mapping(find_config("imu", base)))
+    content = imu_mapping(base)
     content["name"] = path.stem
     noise = {}
     for triad, unit, white in (("gyro", GYRO_UNIT, measured.gyro), ("accel", ACCEL_UNIT, measured.accel)):
