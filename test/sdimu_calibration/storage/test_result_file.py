@@ -218,3 +218,10 @@ def test_a_value_that_is_no_number_is_read_but_not_used(tmp_path, key):
     assert read_result(path).names[1] == "gyro_bias_y"
     with pytest.raises(DataError, match=r"result\.json: gyro_bias_y: its value or a covariance is no number"):
         read_judged_result(path)
+
+
+@pytest.mark.parametrize("end", ["temperature_low_degc", "temperature_high_degc"])
+def test_a_result_has_both_ends_of_its_temperatures_or_none(tmp_path, end):
+    with pytest.raises(DataError, match=r"origin: temperature_low_degc and temperature_high_degc: a number") as error:
+        read_result(_damaged(tmp_path, ("origin", end), 20.0))
+    assert "\n" not in str(error.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import reprlib
 from dataclasses import fields, replace
@@ -77,6 +78,12 @@ def _is_stamped(origin: Origin) -> Origin:
     return origin
 
 
+def _is_ranged(origin: Origin) -> Origin:
+    if math.isfinite(origin.temperature_low_degc) != math.isfinite(origin.temperature_high_degc):
+        raise ValueError("temperature_low_degc and temperature_high_degc: a number is expected of both, or of neither")
+    return origin
+
+
 Word = Annotated[str, AfterValidator(_is_word)]
 """A name or a unit: text without anything that a terminal or a file would obey."""
 Size = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -132,7 +139,7 @@ class ResultFile(ResultModel):
 
     format: Literal["sdimu-result/1"] = FORMAT
     verdict: str = ""
-    origin: Annotated[Origin, Entry(seldom=PATHS), AfterValidator(_is_stamped)] = Origin()
+    origin: Annotated[Origin, Entry(seldom=PATHS), AfterValidator(_is_stamped), AfterValidator(_is_ranged)] = Origin()
     imu_noise: ImuNoise | None = None
     estimator: Line = ""
     estimator_reason: Line = ""
