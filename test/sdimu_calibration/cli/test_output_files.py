@@ -66,6 +66,15 @@ def test_replace_replaces_a_file_but_none_of_a_recording(said, tmp_path, verb):
     assert "stands in the recording" in err or "is read from" in err
 
 
+@pytest.mark.parametrize("verb", [verb for verb in WRITERS if verb not in {"truth", "plan"}])
+def test_replace_replaces_no_file_of_another_kind(said, tmp_path, verb):
+    (tmp_path / "mine.json").write_text('{"format": "sdimu-result/1"}')
+    status, err = said(WRITERS[verb].replace("PLACE", "mine.json") + " --replace")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "mine.json: is a file of another kind (sdimu-result); name another file with --" in err
+    assert (tmp_path / "mine.json").read_text() == '{"format": "sdimu-result/1"}'
+
+
 @pytest.mark.parametrize(
     ("line", "source"),
     [

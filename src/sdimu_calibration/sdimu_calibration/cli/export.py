@@ -64,7 +64,7 @@ def export(
     specification, whose = noise_for(calibration, imu)
     sources = [folder / "result.json" if result.is_dir() else result, *effect_files(effect or [])]
     sources += [find_config("imu", imu)] if imu else []
-    free = partial(check_file_room, option="--out", replace=replace, sources=sources)
+    free = partial(check_file_room, option="--out", kind="sdimu-compensation", replace=replace, sources=sources)
     done = write(form, out or folder / name, calibration, specification, own, rate, temperature, free)
     console = plain()
     for text in done.missing:

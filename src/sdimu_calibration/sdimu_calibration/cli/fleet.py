@@ -41,7 +41,7 @@ def fleet(
         load_imu(imu)
     if priors is not None:
         read = [path for folder in folders for path in ([folder] if folder.is_file() else folder.rglob("*.json"))]
-        check_file_room(priors, "--priors", replace=replace, sources=read)
+        check_file_room(priors, "--priors", kind="sdimu-imu", replace=replace, sources=read)
     gathered = gather(folders)
     for line in gathered.apart:
         say(console, f"set apart: {line}")

@@ -150,7 +150,8 @@ def plan(
     start = load_plan(planned.plan)
     paths = [*(request.after or []), *(more or [])]
     if not request.tell:
-        check_file_room(request.out, "--out", replace=request.replace, sources=_sources(planned, paths))
+        sources = _sources(planned, paths)
+        check_file_room(request.out, "--out", kind="sdimu-plan", replace=request.replace, sources=sources)
     if request.backwards:
         _write_backwards(console, start, request.out)
         answer({"plan": str(request.out), "minutes": start.duration_s / 60.0}, request.as_json)

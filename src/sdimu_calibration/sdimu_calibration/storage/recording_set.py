@@ -239,7 +239,7 @@ def write_set(path: Path, bags: Sequence[Path], stated: Said = _UNSAID, *, repla
     `path`: file to make; bags are named from its folder. `replace`: a file that is there may go.
     """
     path = Path(path)
-    check_file_room(path, "--out", replace=replace, sources=bags)
+    check_file_room(path, "--out", kind="sdimu-set", replace=replace, sources=bags)
     base = path.resolve().parent
     entries = []
     names = [bag.resolve().name for bag in bags]

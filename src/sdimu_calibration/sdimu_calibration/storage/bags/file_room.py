@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,7 +13,13 @@ from sdimu_calibration.storage.bags.bag_metadata import METADATA
 from sdimu_calibration.storage.files.whole_file import same_file
 
 
-def check_file_room(path: Path, option: str, *, replace: bool = False, sources: Iterable[Path] = ()) -> None:
+_HEAD = 65_536
+"""Length (bytes) of the beginning of a file in which it says its format: below remarks, and priors of an IMU."""
+_FORMAT = re.compile(rb"""^[{ \t]*["']?format["']?[ \t]*:[ \t]*["']?(sdimu-[a-z0-9-]+)/""", re.MULTILINE)
+"""How a file of the project says its format, in YAML or JSON."""
+
+
+def check_file_room(path: Path, option: str, *, kind: str, replace: bool = False, sources: Iterable[Path] = ()) -> None:
     """Raise DataError unless a file can be made at `path`: nothing is there, or a file that is to be replaced.
 
     Parameters
@@ -21,14 +28,29 @@ def check_file_room(path: Path, option: str, *, replace: bool = False, sources: 
         File to make.
     option : str
         What names another one, for the message: ``--out``.
+    kind : str
+        Format of the file that is made, without its number: ``sdimu-plan``.
     replace : bool
-        A file that is there may go; one that is read, or is part of a recording, never.
+        A file that is there may go; one that is read, is part of a recording, or says that it is of another format of
+        the project, never.
     sources : iterable of Path
         Files and folders that are read; a link to one, of any kind, is that one.
     """
     check_no_source(path, option, sources)
     if os.path.lexists(path) and not replace:
         raise DataError(f"{path}: is there already; --replace replaces it, or name another file with {option}")
+    found = _format_of(path)
+    if found not in {"", kind}:
+        raise DataError(f"{path}: is a file of another kind ({found}); name another file with {option}")
+
+
+def _format_of(path: Path) -> str:
+    """Format that a file says of itself, without its number; empty where it says none of the project."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        found = _FORMAT.search(file.read(_HEAD))
+    return found[1].decode() if found else ""
 
 
 def check_no_source(path: Path, option: str, sources: Iterable[Path] = ()) -> None:
