@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -113,3 +114,20 @@ def test_a_verb_that_is_none_names_those_that_look_like_it(monkeypatch, capsys):
             cli.main()
         assert ending.value.code == 2
         assert words in " ".join(capsys.readouterr().err.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("free", "told"), [(0, r"no space is left on the disk of .*log"), (10**9, r"ended with status 1; see .*\.log")]
+)
+def test_a_node_without_last_words_on_a_full_disk_is_told_as_such(tmp_path, monkeypatch, free, told):
+    usage = shutil.disk_usage(tmp_path)._replace(free=free)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    folder = tmp_path / "log"
+    folder.mkdir()
+    children = Children(folder)
+    # A module that is not there writes to the log; its words are lost as on a full disk.
+    children.run("recorder", "no_such_module", [])
+    children._children["recorder"].process.wait()
+    (folder / "recorder.log").write_text("")
+    with pytest.raises(DataError, match=f"recorder: .*{told}"):
+        children.running()

@@ -6,6 +6,7 @@ import ctypes
 import fcntl
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,6 +32,8 @@ _LOCK = "sdimu-domain-"
 POLITE_S = 5.0
 _PATIENT_S = 60.0
 """Longest wait for a node that is stopped by itself (s): on a busy machine closing its files takes long."""
+_FULL = 65_536
+"""Free space of a disk (bytes) below which it is full: a part of a recording, and a log, no longer fit."""
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
@@ -303,4 +306,8 @@ def _last_words(log: Path, code: int) -> str:
     if code < 0:
         return f"was ended by {signal.Signals(-code).name}; see {log}"
     lines = [line for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
-    return lines[-1] if lines else f"ended with status {code}; see {log}"
+    if lines:
+        return lines[-1]
+    if shutil.disk_usage(log.parent).free < _FULL:
+        return f"ended with status {code}: no space is left on the disk of {log.parent}"
+    return f"ended with status {code}; see {log}"
