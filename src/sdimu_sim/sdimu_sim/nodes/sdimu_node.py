@@ -22,6 +22,7 @@ from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float64MultiArray
 
 from rate_table_sim.nodes.motion_message import decode_motion
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.nodes.credits import LATCHED, NS, STREAM, Consumer, Producer, header, publish
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
@@ -31,7 +32,7 @@ from sdimu_calibration.nodes.transforms import IDENTITY, PLATFORM, STATIC, Trans
 from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.cli.options import mount_rad
-from sdimu_sim.core.generator import ImuGenerator
+from sdimu_sim.core.generator import ImuGenerator, ImuSamples
 from sdimu_sim.core.platform import PlatformMotion
 from sdimu_sim.core.scenario import Scenario, imu_truth
 from sdimu_sim.core.temperature import Thermometer
@@ -141,7 +142,7 @@ class SdimuNode:
         self._start_ns, t, q_nt, omega_nt_t = decode_motion(message)
         if self._place is not None and not self._motion_ns:
             self._place.publish(TransformMessage([(PLATFORM, self._frame)]).encode(self._start_ns, [IDENTITY]))
-        samples = self._generator.advance(PlatformMotion(t, q_nt, omega_nt_t))
+        samples = self._samples(PlatformMotion(t, q_nt, omega_nt_t))
         stamps = self._start_ns + samples.ns
         encoded = encode_imu(stamps, samples.omega_ib_b, samples.f_ib_b, self._frame, self._covariances)
         queue: list[tuple[int, Any, Any]] = [
@@ -152,6 +153,16 @@ class SdimuNode:
         self._ready.extend(queue)
         self._motion_ns = self._start_ns + round(float(t[-1]) * NS)
         self._pump()
+
+    def _samples(self, motion: PlatformMotion) -> ImuSamples:
+        """Make the samples of a block of motion; two tables in one domain are told by what they break."""
+        try:
+            return self._generator.advance(motion)
+        except DataError as error:
+            topic = self._motion.topic
+            if self.node.count_publishers(topic) > 1:
+                raise DataError(f"a second table publishes {topic}: end one, or use another ROS_DOMAIN_ID") from error
+            raise
 
     def _temperatures(self, until_s: float) -> list[tuple[int, Any, Any]]:
         """Temperatures at 1 Hz up to a time."""
