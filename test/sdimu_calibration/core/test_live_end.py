@@ -107,6 +107,13 @@ def spikes_and_a_stuck_axis(m):
     return replace(m, w=w, f=f)
 
 
+def stamp_of_another_year(m):
+    """One sample of a turn is stamped years ahead."""
+    ns = m.ns.copy()
+    ns[700] = 2_000_000_000 * NS
+    return replace(m, ns=ns, told=("1 sample has a stamp outside the test (2033-05-18",))
+
+
 def torn(m):
     """Samples missing, not finite, and twice."""
     keep = np.r_[0:150, 157 : len(m.ns)]
@@ -150,6 +157,7 @@ CASES = (
     no_numbers,
     no_status,
     spikes_and_a_stuck_axis,
+    stamp_of_another_year,
     torn,
     warm_another_day,
 )
@@ -224,6 +232,7 @@ def test_live_end_and_bag_open_the_same_recording(case, tmp_path):
         ("dtg", (foreign_units, negated_rate, bursts, no_status)),
         ("rlg_navigation", (negated_force, spikes_and_a_stuck_axis)),
         ("fog_tactical", (foreign_units, jitter, no_status, torn)),
+        ("dtg", (stamp_of_another_year,)),
         ("mems_industrial", (foreign_units, no_status)),
     ],
 )

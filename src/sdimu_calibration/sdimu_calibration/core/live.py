@@ -15,7 +15,7 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.data.arrival import RawTest, in_order
+from sdimu_calibration.core.data.arrival import RawTest, in_order, of_the_test
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
@@ -23,6 +23,7 @@ from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
+from sdimu_calibration.core.data.stray_stamps import StampSieve, stray_note
 from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.effects import body_frame
@@ -106,6 +107,7 @@ class LiveCalibration:
         self.setup = self._model.setup
         self.notes = self._model.notes
         """What the caller should publish, such as what the filter waits for; the caller empties the list."""
+        self._sieve, self._strays = StampSieve(), 0
         self._intake = Intake()
         self._kept: KeptTest | None = KeptTest()
         self._raw: Callable[[], RawTest] = self._kept.raw
@@ -138,8 +140,9 @@ class LiveCalibration:
     def add_samples(self, ns: Ints, omega_ib_b: Floats, f_ib_b: Floats) -> None:
         """Take samples as the messages have them.
 
-        Samples that are not finite, or not later than the last one taken, are counted and do not reach the filter on
-        the way; the end of the test sorts them in as the reader of bags does.
+        Samples with a stamp of no time of the test are left out, on the way and at the end. Samples that are not
+        finite, or not later than the last one taken, are counted and do not reach the filter on the way; the end of the
+        test sorts them in as the reader of bags does.
 
         Parameters
         ----------
@@ -152,8 +155,17 @@ class LiveCalibration:
             self._kept.samples(ns, omega_ib_b, f_ib_b)
         if self._early is not None:
             self._early.samples(ns, omega_ib_b, f_ib_b)
+        ns, omega_ib_b, f_ib_b = self._sieve.take(ns, omega_ib_b, f_ib_b)
+        self._count_strays(self._sieve.strays())
         if not self._idle:
             self._intake.add_samples(ns, omega_ib_b, f_ib_b)
+
+    def _count_strays(self, strays_ns: Ints) -> None:
+        """Count samples with stamps (ns) of no time of the test, and say so once."""
+        if len(strays_ns) and not self._strays:
+            self.notes.append(stray_note(strays_ns))
+        self._strays += len(strays_ns)
+        self._intake.rejected += len(strays_ns)
 
     def add_phase(self, ns: int, dwell: bool, stop: int) -> None:
         """Take a status of the table that holds from a stamp (ns) on; stop `UNNUMBERED` where it names none."""
@@ -168,6 +180,16 @@ class LiveCalibration:
             self._kept.temperature(ns, value)
         if not self._idle:
             self._intake.add_temperature(ns, value)
+
+    @property
+    def first_ns(self) -> int:
+        """Stamp (ns) of the first sample of the test; `NEVER` before it has come."""
+        return self._sieve.first_ns
+
+    @property
+    def newest_ns(self) -> int:
+        """Newest stamp (ns) of the samples of the test; `NEVER` before the first has come."""
+        return self._sieve.newest_ns
 
     @property
     def next_ns(self) -> int | None:
@@ -237,7 +259,7 @@ class LiveCalibration:
         """Say once, while it can still be mended, what the end would say of a second publisher."""
         if self._early is None:
             return
-        raw, self._early = self._early.raw(), None
+        raw, self._early = of_the_test(self._early.raw())[0], None
         try:
             self.notes += one_stream(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)[1]
         except DataError as error:

@@ -194,10 +194,11 @@ class Feed:
         return [message for message, taken in zip(raw, kept, strict=True) if taken]
 
     def _keep(self, samples: Samples) -> None:
-        if self._first_ns is None:
-            self._first_ns = int(samples.ns[0])
         self._live.add_samples(samples.ns, samples.omega_ib_b, samples.f_ib_b)
-        self.imu_ns = max(self.imu_ns, int(samples.ns.max()))
+        # Not those of the samples: a stray years ahead would be the newest for the rest of the test.
+        if self._first_ns is None and self._live.first_ns != NEVER:
+            self._first_ns = self._live.first_ns
+        self.imu_ns = max(self.imu_ns, self._live.newest_ns)
 
     def take_status(self, stamp_ns: int, dwell: bool, stop: int) -> None:
         """Take a status that holds from `stamp_ns` on."""

@@ -7,6 +7,7 @@ from collections import deque
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.data.stray_stamps import StampSieve
 from sdimu_calibration.storage.files.journal import Samples
 
 _REMEMBERED = 100_000
@@ -17,9 +18,13 @@ _STRANGERS = 10
 
 
 class Remembered:
-    """The first and the last samples of a journal; those between are known by their time alone."""
+    """The first and the last samples of a journal; those between are known by their time alone.
+
+    Samples with a stamp of no time of the test are not remembered: none of the test comes after one years ahead.
+    """
 
     def __init__(self) -> None:
+        self._sieve = StampSieve()
         self._head: list[Samples] = []
         self._tail: deque[Samples] = deque()
         self._counts = [0, 0]
@@ -30,7 +35,10 @@ class Remembered:
 
     def add(self, samples: Samples) -> None:
         """Take the next samples of the journal."""
-        self.newest_ns = max(self.newest_ns, int(samples.ns.max()))
+        samples = Samples(*self._sieve.take(samples.ns, samples.omega_ib_b, samples.f_ib_b))
+        if not len(samples.ns):
+            return
+        self.newest_ns = self._sieve.newest_ns
         if self._counts[0] < _REMEMBERED:
             self._head.append(samples)
             self._counts[0] += len(samples.ns)

@@ -16,6 +16,7 @@ from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
+from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps
 from sdimu_calibration.core.data.strays import stamp_text, strays
 from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.plain_text import counted
@@ -225,16 +226,25 @@ def _refuse_clock_set_back(ns: Stamps, omega_ib_b: Floats, f_ib_b: Floats, where
         )
 
 
+def of_the_test(raw: RawTest) -> tuple[RawTest, tuple[str, ...]]:
+    """Leave samples out whose stamps are of no time of the test; the rest, and a note where some were."""
+    strays = stray_stamps(raw.ns)
+    if not len(strays):
+        return raw, ()
+    return _with_rows(raw, np.delete(np.arange(len(raw.ns)), strays)), (stray_note(raw.ns[strays]),)
+
+
 def in_order(raw: RawTest) -> Recording:
     """Order samples and logs by their stamps and count seconds from one nominal interval before the first sample."""
     came = len(raw.ns)
+    raw, outside = of_the_test(raw)
     raw, streams = _of_one_sensor(raw)
     bursts = _bursts(raw)
     steps = find_steps(raw.ns, raw.omega_ib_b, raw.f_ib_b) if bursts is None else ()
     raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    notes = [*streams, *([] if bursts is None else [str(bursts)]), *arranged.notes]
+    notes = [*outside, *streams, *([] if bursts is None else [str(bursts)]), *arranged.notes]
     # Samples that are all there and in order are not copied.
     rows = arranged.rows if any(arranged.counts.values()) else slice(None)
     ns = stamps[rows]
@@ -252,12 +262,16 @@ def in_order(raw: RawTest) -> Recording:
     )
 
 
+def _with_rows(raw: RawTest, rows: Ints) -> RawTest:
+    return replace(raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows])
+
+
 def _of_one_sensor(raw: RawTest) -> tuple[RawTest, tuple[str, ...]]:
     """Leave the samples of a second publisher out before their stamps are taken for a fault of a clock."""
     rows, notes = one_stream(raw.ns, raw.omega_ib_b, raw.f_ib_b, raw.where)
     if rows is None:
         return raw, notes
-    return replace(raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows]), notes
+    return _with_rows(raw, rows), notes
 
 
 def _without_steps(raw: RawTest, steps: tuple[Step, ...]) -> RawTest:

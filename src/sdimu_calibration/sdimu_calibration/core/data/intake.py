@@ -7,6 +7,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.far_samples import far_samples, largest
 from sdimu_calibration.core.data.recent_log import RecentLog
+from sdimu_calibration.core.data.stray_stamps import NEVER
 from sdimu_calibration.core.recording import (
     NOMINAL_FROM,
     PhaseLog,
@@ -16,8 +17,6 @@ from sdimu_calibration.core.recording import (
     seconds,
 )
 
-NEVER = -(2**62)
-"""Stamp before all others (ns): where nothing has come yet."""
 _WAITING = 100 * NOMINAL_FROM
 """Number of samples that wait for the origin at most: of more, those whose stamps ascend are enough."""
 _REPEATED = 16_384

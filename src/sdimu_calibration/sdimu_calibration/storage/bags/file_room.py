@@ -12,7 +12,6 @@ from sdimu_calibration.storage.bags.bag_file import BAG_SUFFIXES
 from sdimu_calibration.storage.bags.bag_metadata import METADATA
 from sdimu_calibration.storage.files.whole_file import same_file
 
-
 _HEAD = 65_536
 """Length (bytes) of the beginning of a file in which it says its format: below remarks, and priors of an IMU."""
 _FORMAT = re.compile(rb"""^[{ \t]*["']?format["']?[ \t]*:[ \t]*["']?(sdimu-[a-z0-9-]+)/""", re.MULTILINE)
