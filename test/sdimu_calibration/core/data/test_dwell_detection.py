@@ -10,6 +10,7 @@ import pytest
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, detected_dwells, with_detected_dwells
 from sdimu_calibration.core.data.phases import rest_limits
 from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
 from sdimu_sim.core.scenario import Scenario, generate
 
@@ -29,6 +30,30 @@ def test_slow_turns_of_an_imu_with_a_bias_as_large_are_found(seed):
     assert not (log.dwell & ~said).any()
     assert (said & ~log.dwell).sum() * np.median(np.diff(log.t)) < 2 * 1.5 * len(HURRIED.turns)
     assert len(np.unique(log.stop[log.dwell])) == len(HURRIED.dwell_s)
+
+
+@pytest.mark.parametrize("seed", range(87, 91))
+@pytest.mark.parametrize("rate_deg_s", [2.0, 5.0, 10.0])
+def test_turns_that_begin_and_end_softly_are_turns_from_the_beginning(seed, rate_deg_s):
+    """S-curves, at their means of `rate_deg_s`: what a table turns in what is called rest is nothing that is seen."""
+    rng, interval = np.random.default_rng(seed), 0.05
+    turn, rest = 270.0 / rate_deg_s, 40.0 + rng.random()
+    n = round((3 * rest + 2 * turn) / interval)
+    t = interval * np.arange(1, n + 1)
+    rate = np.zeros(n)
+    for begin in (rest, 2 * rest + turn):
+        inside = (t > begin) & (t <= begin + turn)
+        rate[inside] = np.radians(rate_deg_s) * (1.0 - np.cos(2.0 * np.pi * (t[inside] - begin) / turn))
+    w = np.stack([np.zeros(n), rate, np.zeros(n)], axis=1) + MEMS.gyro_white_noise / np.sqrt(interval) * (
+        rng.standard_normal((n, 3))
+    )
+    angle = np.cumsum(rate) * interval
+    f = 9.8 * np.stack([-np.sin(angle), np.zeros(n), np.cos(angle)], axis=1)
+    log = detected_dwells(Recording(0, t, w, f))
+    at_rest = log.dwell[np.clip(np.searchsorted(log.t, t, side="right") - 1, 0, None)]
+    assert len(np.unique(log.stop[log.dwell])) == 3
+    assert np.degrees(rate[at_rest].sum()) * interval * 3600.0 < 1.0
+    assert (at_rest & (rate == 0.0)).sum() * interval > 3 * 25.0
 
 
 def test_a_specification_that_tells_rest_and_a_status_are_left_alone():

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.estimation.outcome import outcome
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
@@ -89,6 +91,14 @@ def test_recordings_of_which_none_knows_an_azimuth_are_a_set(seed):
 @pytest.mark.parametrize("grade", GRADES)
 def test_six_rests_of_a_cube_are_a_set(grade, seed):
     checked(rests(grade, seed, CUBE), grade, seed, CUBE)
+
+
+def test_passes_that_do_not_converge_widen_no_prior():
+    """In this rest the passes in white noise go to and fro; with a wider prior a scale factor of -2 fits as well."""
+    found = solve(rests("fog_tactical", 482006)[3].open(), load_model("baseline"))
+    result = outcome(found)
+    scale = [k for k, name in enumerate(result.names) if name.startswith("gyro_scale")]
+    assert (np.abs(result.values[scale]) < 3.0 * load_imu("fog_tactical").prior["gyro_scale"]).all()
 
 
 @pytest.mark.parametrize("grade", GRADES)

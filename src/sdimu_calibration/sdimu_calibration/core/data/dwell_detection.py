@@ -24,6 +24,10 @@ _WINDOW_S = 0.5
 """Length of a window (s): long enough for a mean, short against a rest."""
 _SHORTEST_S = 2.0
 """Shortest rest (s): what is shorter is a part of the turn."""
+_FAST = 8.0
+"""Rate of a turn, as a multiple of the largest that passes for rest (1), from which it is seen as it is."""
+_MOST_UNSEEN = 10
+"""Number of windows at most in which a turn goes on unseen: five seconds, the ramp of a table at a few deg/s."""
 _REMEMBERED = 4096
 """Number of windows from which a running test learns noise and usual reading: half an hour and more."""
 _BEGIN = 6
@@ -60,8 +64,27 @@ def with_detected_dwells(recording: Recording, imu: ImuSpecification) -> Recordi
 def detected_dwells(recording: Recording) -> PhaseLog | None:
     """Find the dwells from the samples; None when there are none."""
     windows = cut_windows(recording.t, recording.omega_ib_b, recording.f_ib_b, _WINDOW_S)
-    log = _dwells(windows, windows.still)
+    still = windows.still
+    log = _dwells(windows, still & ~_unseen_ramps(windows, still))
     return log if log.dwell.any() else None
+
+
+def _unseen_ramps(windows: Windows, still: Bools) -> Bools:
+    """Windows (k,) of a turn that begins or ends so softly that the gyros do not show it there.
+
+    The rate of a soft turn grows with the square of time or faster. From where it shows it needs as long again, and
+    more, to eight times as much: so long it may have gone on unseen.
+    """
+    unseen = np.zeros(len(still), dtype=bool)
+    if not still.any():
+        return unseen
+    turning = windows.turning(windows.quiet)
+    for first, last in zip(*runs(~still), strict=True):
+        fast = np.flatnonzero(turning[first:last] > _FAST)
+        if len(fast):
+            unseen[max(0, first - min(int(fast[0]), _MOST_UNSEEN)) : first] = True
+            unseen[last : last + min(last - first - 1 - int(fast[-1]), _MOST_UNSEEN)] = True
+    return unseen
 
 
 def _dwells(windows: Windows, still: Bools) -> PhaseLog:

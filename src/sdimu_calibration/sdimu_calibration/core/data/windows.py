@@ -102,13 +102,28 @@ class Windows:
         """
         if not quiet.any():
             return np.zeros(len(self), dtype=bool)
+        usual = GAUSS_MAD * float(np.median(self.swing[quiet]))
+        earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE
+        return np.asarray((self.turning(quiet) < 1.0) & (self.swing < _REST * usual + earth_turn))
+
+    def turning(self, quiet: Bools) -> Floats:
+        """Difference of the gyros' readings from the usual one, as a multiple of the largest at rest.
+
+        Parameters
+        ----------
+        quiet : ndarray of bool, shape (k,)
+            As of `still_as`, one at least.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            Of the axis that differs most (1).
+        """
         steps = np.diff(self.w_mean, axis=0)[quiet[1:] & quiet[:-1]]
         noise = GAUSS_MAD * np.median(np.abs(steps), axis=0) / np.sqrt(2.0) if len(steps) else np.zeros(3)
-        usual = GAUSS_MAD * float(np.median(self.swing[quiet]))
         limit = np.minimum(_TURNING_EARTH * earth.RATE + _REST * noise, _MOVING)
-        still = (np.abs(self.w_mean - np.median(self.w_mean[quiet], axis=0)) < limit).all(axis=1)
-        earth_turn = self.length * self.interval_s * _TURNING_EARTH * earth.RATE
-        return np.asarray(still & (self.swing < _REST * usual + earth_turn))
+        differs = np.abs(self.w_mean - np.median(self.w_mean[quiet], axis=0))
+        return np.asarray((differs / limit).max(axis=1))
 
 
 _ROWS = ("start", "end", "first", "up_first", "up_last", "w_mean", "f_mean")

@@ -417,7 +417,7 @@ def solve(setup: TestSetup, prepared: PreparedData, begin: StartPoint | None, pr
 def with_room(
     found: Solution[AnyPass], again: Callable[[TestSetup, AnyPass], tuple[AnyPass, int, bool]]
 ) -> Solution[AnyPass]:
-    """Repeat passes with wider priors where the data contradict them.
+    """Repeat passes that converged with wider priors where the data contradict them.
 
     Parameters
     ----------
@@ -425,6 +425,9 @@ def with_room(
         Goes on from a pass in another setup: the last pass, the number of passes made, whether they converged.
     """
     for _ in range(MOST_WIDENINGS):
+        # An estimate that does not stand still says nothing against a prior.
+        if not found.converged:
+            break
         setup, last = found.setup, found.last
         means = means_at_stops(last.output.innovation / last.output.innovation_sigma, found.prepared)[1]
         scatter = max(1.0, float(np.sqrt(np.nanmean(means**2))))
