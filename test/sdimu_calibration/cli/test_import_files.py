@@ -54,3 +54,8 @@ def test_a_bad_cell_ends_with_one_line_and_no_bag(folder, monkeypatch, capsys):
     assert err.count("\n") == 1
     assert f"{path}: line 51, column gx: 'one' is not a number" in err
     assert not (folder / "bag").exists()
+
+
+def test_the_next_command_of_single_attitudes_is_one_of_single_attitudes(folder, monkeypatch, capsys):
+    assert not run(monkeypatch, "import", folder / "a.csv", "--each", "--out", folder / "set")
+    assert capsys.readouterr().out.split()[-1] == "--each"

@@ -9,7 +9,7 @@ import shlex
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 from unittest import mock
@@ -261,4 +261,7 @@ def test_advice_repeats_what_was_asked_for():
     back = Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)
     assert sentence(back).endswith("The other order: sdimu plan --plan YOURS --backwards.")
     assert shlex.split(spelled(back, asked))[2:4] == ["--plan", "out/plan.yaml"]
+    # Where no plan was seen there is no such file.
+    unseen = shlex.split(spelled(back, replace(asked, has_plan=False)))
+    assert unseen[2:4] == ["--plan", "PLAN_OF_THIS_TEST.yaml"]
     assert spelled(Advice(Kind.LOOK_AT_MOUNT), asked) == ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -90,7 +90,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         progress("navigation without aid", 0.97)
         more = report_extras(found, fit)
     summary = summarise(found)
-    about = Asked.of((bag,), folder, opening, request)
+    about = replace(Asked.of((bag,), folder, opening, request), has_plan=as_plan(summary.plan) is not None)
     print_summary(console, summary, about, more)
     null = None
     if request.bootstrap:

@@ -48,7 +48,7 @@ def import_files(
 
     console = plain()
     if chart is None:
-        _propose(console, files, out, replace)
+        _propose(console, files, out, each, replace)
         return
     if out is None:
         raise typer.BadParameter("name the folder of the bag to make", param_hint="--out")
@@ -97,7 +97,7 @@ def _set_of(console: Console, folder: Path, bags: Sequence[Path], replace: bool)
     command(console, joined(["sdimu", "calibrate", "--set", str(path)]))
 
 
-def _propose(console: Console, files: Sequence[Path], out: Path | None, replace: bool) -> None:
+def _propose(console: Console, files: Sequence[Path], out: Path | None, each: bool, replace: bool) -> None:
     """Write maps that probably fit, and say how to go on."""
     from sdimu_calibration.storage.bags.file_room import check_no_source
     from sdimu_calibration.storage.importing.map_proposal import propose_maps
@@ -114,4 +114,4 @@ def _propose(console: Console, files: Sequence[Path], out: Path | None, replace:
         bag = out or Path(f"{files[0].stem}{proposal.suffix}_bag")
         say(console, f"{path}: the map that is proposed; look at it, then:")
         words = ["sdimu", "import", *map(str, files), "--map", str(path), "--out", str(bag)]
-        command(console, joined(words))
+        command(console, joined([*words, "--each"] if each else words))

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 PLAN = "plan.yaml"
 """File beside a diagnosis: the plan as the motion showed it."""
+_OWN_PLAN = "PLAN_OF_THIS_TEST.yaml"
 PLAN_SHOWN, PLAN_RUN, PLAN_CHOSEN = "The plan as the motion showed it", "The plan that was run", "The turns chosen for"
 """How the remark begins at the head of a plan that a verb leaves with its results: a new one may replace it."""
 _ACCELERATION = 1.0
@@ -48,6 +49,8 @@ class Asked:
     place: Sequence[str]
     """Site and IMU alone, likewise."""
     folder: Path
+    has_plan: bool = True
+    """Whether the plan as the motion showed it is in the folder."""
 
     @classmethod
     def of(cls, bags: Sequence[Path], folder: Path, opening: Place, fitted: Fitted | None = None) -> Asked:
@@ -75,7 +78,9 @@ def spelled(advice: Advice, asked: Asked) -> str:
     if advice.verb == Verb.CONTINUE:
         return joined(["sdimu", "plan", "--after", str(asked.folder)])
     if advice.verb in {Verb.REVERSE_PLAN, Verb.RANK_TURNS}:
-        return f"sdimu plan {joined(['--plan', str(asked.folder / PLAN), *asked.place])} {plan_options(advice)}"
+        # Where the motion showed no plan, the user has the one that the table ran.
+        plan = str(asked.folder / PLAN) if asked.has_plan else _OWN_PLAN
+        return f"sdimu plan {joined(['--plan', plan, *asked.place])} {plan_options(advice)}"
     return ""
 
 

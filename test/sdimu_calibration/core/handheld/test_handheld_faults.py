@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.data.gaps import step_fault, told_together
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import ClockStep
 from sdimu_calibration.storage.files.config import load_imu, load_site
@@ -77,6 +78,17 @@ def test_steps_of_the_clock_are_told_with_time_and_size(run, fastest, sound):
         "paused: samples are taken as even",
     ]
     assert moved(found, sound) < 1.0
+
+
+def test_many_equal_steps_of_the_clock_are_one_line():
+    steps = [ClockStep(0.5 + 10.0 * k, -0.001) for k in range(42)]
+    last = ClockStep(415.0, 0.025)
+    told = told_together([*(step_fault(step, resting=True) for step in steps), step_fault(last, resting=True)])
+    assert [fault.text.partition(": ")[0] for fault in told] == [
+        "the clock of the stamps was set back by 1 ms, 42 times from 0.5 to 410.5 s, at rest",
+        "the clock of the stamps was set on by 25 ms at 415.0 s at rest, or the driver paused",
+    ]
+    assert [fault.count for fault in told] == [42, 1]
 
 
 @pytest.mark.parametrize("lost", [5, 30])

@@ -19,6 +19,7 @@ these differ it moved or was switched off, and no covariance is honest. Source: 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,6 +136,10 @@ def bridges(
     return Bridges(white, angle, velocity)
 
 
+_ONE_BY_ONE = 3
+"""Number of equal steps of the clock at most that are told one by one: more have one cause."""
+
+
 def stepped(
     found: Bridges, cycles: Cycles, epochs: Epochs, dwell: Bools, steps: tuple[ClockStep, ...], gravity: float
 ) -> tuple[Bridges, tuple[DataFault, ...]]:
@@ -159,7 +164,7 @@ def stepped(
             angle[epoch] = math.hypot(angle[epoch], error)
             velocity[epoch] = math.hypot(velocity[epoch], gravity * abs(step.size_s) * error)
         faults.append(step_fault(step, resting))
-    return Bridges(found.white, angle, velocity), tuple(faults)
+    return Bridges(found.white, angle, velocity), told_together(faults)
 
 
 def open_angle(step: ClockStep, cycles: Cycles) -> tuple[int, float]:
@@ -175,6 +180,22 @@ def step_fault(step: ClockStep, resting: bool) -> DataFault:
     pause = ", or the driver paused" if step.size_s > 0.0 and step.open > _TOLD else ""
     text = f"{step} {'at rest' if resting else 'while the IMU turned'}{pause}: samples are taken as even"
     return DataFault("clock", text, 1, step.t, step.t)
+
+
+def told_together(steps: Sequence[DataFault]) -> tuple[DataFault, ...]:
+    """Tell steps of the clock that are alike in one line, where they are many. `steps`: as `step_fault` tells them."""
+    alike: dict[str, list[DataFault]] = {}
+    for one in steps:
+        alike.setdefault(one.text.replace(f" at {one.start_s:.1f} s", ""), []).append(one)
+    out: list[DataFault] = []
+    for own in alike.values():
+        if len(own) <= _ONE_BY_ONE:
+            out += own
+            continue
+        begin, end = own[0].start_s, own[-1].end_s
+        often = f", {len(own)} times from {begin:.1f} to {end:.1f} s,"
+        out.append(DataFault("clock", own[0].text.replace(f" at {begin:.1f} s", often), len(own), begin, end))
+    return tuple(sorted(out, key=lambda fault: fault.start_s))
 
 
 def weighed(found: Bridges, epochs: Epochs, t: Floats, excess: Floats) -> Bridges:

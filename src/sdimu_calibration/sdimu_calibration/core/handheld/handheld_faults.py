@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools
-from sdimu_calibration.core.data.gaps import open_angle, step_fault
+from sdimu_calibration.core.data.gaps import open_angle, step_fault, told_together
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
@@ -66,7 +66,7 @@ def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution)
     return (*_missing(run), *_stepped(recording, run), *_clipped(recording), *_misfit(found))
 
 
-def _stepped(recording: Recording, run: HandheldRun) -> list[DataFault]:
+def _stepped(recording: Recording, run: HandheldRun) -> tuple[DataFault, ...]:
     out = []
     for step in recording.clock_steps:
         cycle, _ = open_angle(step, run.cycles)
@@ -74,7 +74,7 @@ def _stepped(recording: Recording, run: HandheldRun) -> list[DataFault]:
         told = step_fault(step, not np.any(turn))
         unseen = bool(np.any(run.unseen & turn))
         out.append(replace(told, text=f"{told.text}; the turn says nothing") if unseen else told)
-    return out
+    return told_together(out)
 
 
 def _missing(run: HandheldRun) -> list[DataFault]:

@@ -90,7 +90,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "stops, or the same attitudes again later, lower its share."
     ),
     Kind.CORRECT_NOISE: lambda gyro, accel: (
-        f"Correct the noise in the IMU's file: gyro times {gyro:.2f}, accelerometer times {accel:.2f}; look for "
+        f"Correct the noise in the IMU's file: gyro times {gyro:.3g}, accelerometer times {accel:.3g}; look for "
         "outliers when the tails are heavy."
     ),
     Kind.UNKNOWN_CAUSE: _unknown,
