@@ -16,10 +16,11 @@ from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
-from sdimu_calibration.core.noise_term import FLICKER, STOP, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
@@ -266,3 +267,14 @@ def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, ver
     assert first.tag != "The model is wrong" or tone == "bad"
     assert first.advice == (f"Use the coefficients of this page{', which hold what was found' if findings else ''}.",)
     assert any("</code> off (" in words for _, words in first.costs) == bool(findings)
+
+
+def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
+    unknown = NoiseTerm("accel", ATTITUDE, size=1e-3, axes=(1,))
+    terms = (NoiseTerm("gyro", FLICKER, size=1e-5), unknown)
+    d = summary.diagnosis
+    told = sentence(replace(d, verdict=Verdict.UNEXPLAINED, rungs=(), found=replace(d.found, noise=terms)), ())
+    left, _, account = told.partition("; the sigmas take ")
+    assert term_in_words(unknown) in left
+    assert "flicker" not in left
+    assert account.startswith("it and gyro bias instability (flicker)")

@@ -154,12 +154,15 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}."
-    drawn = [term_in_words(term) for term in d.found.noise]
-    if any(term.kind in FOLLOWS for term in d.found.noise):
+    follows = [term_in_words(term) for term in d.found.noise if term.kind in FOLLOWS]
+    drawn = [term_in_words(term) for term in d.found.noise if term.kind not in FOLLOWS]
+    if follows:
         begun = (
             f"Found, but not all: {names}. What is left is the" if names else "No effect of the catalogue explains the"
         )
-        return f"{begun} {' and '.join(drawn)}; the sigmas take it into account."
+        # Noise that every sensor has is no part of what is unexplained.
+        account = " and ".join(("it", *drawn))
+        return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
     if drawn:
         begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
         return (
