@@ -159,11 +159,12 @@ def test_a_set_whose_search_came_to_no_end_is_not_called_consistent(summary):
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.4, (), ()))) == Verdict.CLASS_OF_EFFECTS
 
 
-def report_of(nis, *kinds):
+def report_of(nis, *kinds, stops=28):
     """A report with this NIS in white noise, of 1 in noise of these kinds that it learned."""
     noise = tuple(NoiseTerm("gyro", kind, size=1.0) for kind in kinds)
     in_noise = 1.0 if kinds else None
-    return SimpleNamespace(noise=noise, statistics=FitStatistics(0.0, nis, 100.0, 3.0, nis_in_noise=in_noise))
+    statistics = FitStatistics(0.0, nis, 100.0, 3.0, nis_in_noise=in_noise)
+    return SimpleNamespace(noise=noise, statistics=statistics, times=SimpleNamespace(stops=range(stops)))
 
 
 @pytest.mark.parametrize(
@@ -173,6 +174,8 @@ def report_of(nis, *kinds):
         # Both are loud: the one has learned no noise, but it is no recording without an error.
         ((report_of(5.0, STOP), report_of(5.0)), Verdict.CONSISTENT),
         ((report_of(5.0, STOP), report_of(5.0, STOP)), Verdict.CONSISTENT),
+        # In a single rest nothing changes that an effect could follow.
+        ((report_of(5.0, STOP, stops=1), report_of(1.0, stops=1)), Verdict.CONSISTENT),
         # What data sheets know takes in the noise of its own.
         ((report_of(5.0, FLICKER), report_of(1.0)), Verdict.CONSISTENT),
     ],

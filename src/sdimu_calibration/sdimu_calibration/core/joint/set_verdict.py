@@ -84,9 +84,13 @@ class SetFacts:
 
     @property
     def is_of_some(self) -> bool:
-        """Whether some recordings have large errors that noise takes in, and others small ones and no noise."""
-        loud = [r.noise for r in self.fit.reports if worst_figure(r) > MISFIT]
-        quiet = [r.noise for r in self.fit.reports if worst_figure(r) <= MISFIT]
+        """Whether some recordings have large errors that noise takes in, and others small ones and no noise.
+
+        A recording of one stop does not count: nothing that changes with attitude or rate changes in it.
+        """
+        reports = [r for r in self.fit.reports if len(r.times.stops) > 1]
+        loud = [r.noise for r in reports if worst_figure(r) > MISFIT]
+        quiet = [r.noise for r in reports if worst_figure(r) <= MISFIT]
         return any(map(may_be_an_effect, loud)) and any(not noise for noise in quiet)
 
     @property
