@@ -22,7 +22,6 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.search import Search, search, with_steps
 from sdimu_calibration.core.diagnosis.unknown_attitude import with_attitude_functions
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.learned_noise import Wander
@@ -91,18 +90,11 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     wander = wander_in(request.base.bare, done.found.noise)
     if wander.inner is None:
         return request, done
-    return search_until_stable(replace(request, wander=wander), progress, done)
+    return search_until_stable(replace(request, wander=wander), progress)
 
 
-def search_until_stable(request: Request, progress: Progress, before: Round | None = None) -> tuple[Request, Round]:
+def search_until_stable(request: Request, progress: Progress) -> tuple[Request, Round]:
     """Repeat rounds until the choice stands, then fit it in its noise.
-
-    Parameters
-    ----------
-    request : Request
-    progress : callable
-    before : Round, optional
-        Of a search with other stretches: the first round is linear about the fit with what that search chose.
 
     Returns
     -------
@@ -111,7 +103,7 @@ def search_until_stable(request: Request, progress: Progress, before: Round | No
     done : Round
         The last one; its fit holds what it chose.
     """
-    ground = _first_ground(request, progress) if before is None else _ground_after(request, before, progress)
+    ground = _first_ground(request, progress)
     own, asked, stood = False, False, False
     limits: dict[bool, float] = {}
     done: Round | None = None
@@ -155,17 +147,6 @@ def _first_ground(request: Request, progress: Progress) -> Ground:
     found = search(ground.evidence, ground.allowed, None, request.alpha)
     strongest = found.candidates[:1]
     return fresh_ground(request, extended(request, strongest, progress), strongest, False) if strongest else ground
-
-
-def _ground_after(request: Request, before: Round, progress: Progress) -> Ground:
-    """Take the evidence about the fit that an earlier search ended with, where the catalogue has all that it chose.
-
-    Equations that are not in the catalogue enter a search only beside what it leaves.
-    """
-    fit = before.fit
-    if not isinstance(fit, NavigationFit) or not before.chosen or any(c.family == "own" for c in before.chosen):
-        return _first_ground(request, progress)
-    return fresh_ground(request, fit.with_noise(None), before.chosen, False)
 
 
 def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fit:
