@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sdimu_calibration.core.data.intake import NEVER
+from sdimu_calibration.core.data.stray_stamps import NEVER
 from sdimu_calibration.nodes.gate import GREETING_S, LAPSE_DATA_NS, LAPSE_WALL_S, Companion
 
 NS = 10**9

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from sdimu_calibration.core.data.intake import NEVER
+from sdimu_calibration.core.data.stray_stamps import NEVER
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.results import Calibration

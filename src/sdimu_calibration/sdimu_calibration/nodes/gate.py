@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sdimu_calibration.core.data.intake import NEVER
+from sdimu_calibration.core.data.stray_stamps import NEVER
 from sdimu_calibration.core.data.strays import FAR_NS
 
 LAPSE_DATA_NS = 10_000_000_000

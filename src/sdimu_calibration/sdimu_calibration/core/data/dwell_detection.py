@@ -25,7 +25,8 @@ _WINDOW_S = 0.5
 _SHORTEST_S = 2.0
 """Shortest rest (s): what is shorter is a part of the turn."""
 _FAST = 8.0
-"""Rate of a turn, as a multiple of the largest that passes for rest (1), from which it is seen as it is."""
+"""Rate of a turn, as a multiple of the largest that passes for rest (1), up to which its ramp is followed: a rate that
+grows with the square of time has needed half as long to the largest, one that grows with its cube as long."""
 _MOST_UNSEEN = 10
 """Number of windows at most in which a turn goes on unseen: five seconds, the ramp of a table at a few deg/s."""
 _REMEMBERED = 4096

@@ -30,8 +30,8 @@ def held(files: Iterable[Path]) -> Iterator[None]:
                 fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     finally:
-        for stream in streams:
-            stream.close()
+        for held_stream in streams:
+            held_stream.close()
 
 
 @contextmanager
