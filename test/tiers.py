@@ -247,7 +247,6 @@ LONG = {
         "test_what_two_recordings_leave_open_the_advised_third_one_closes",
     ),
     "test/sdimu_calibration/core/posterior/test_coefficients.py": (
-        "test_moments_over_all_models_are_those_of_the_mixture",
         "test_half_of_an_equation_that_no_physics_names_moves_no_coefficient",
         "test_several_equations_of_a_sensor_are_the_cause_together_or_none_is",
     ),
@@ -312,7 +311,6 @@ LONG = {
         "test_the_diagnosis_names_an_effect_of_the_temperature_rate",
     ),
     "test/sdimu_calibration/core/second_order/test_bend.py": (
-        "test_passes_end_where_data_and_the_turned_prior_balance",
         "test_scale_factors_have_the_half_square_of_the_angle_in_their_sigma",
         "test_a_plan_that_shows_everything_makes_no_pass_for_it",
         "test_noise_of_next_to_no_size_moves_nothing_that_the_prior_decides",
@@ -336,7 +334,6 @@ LONG = {
     "test/sdimu_calibration/core/diagnosis/test_grades.py": (
         "test_the_certain_effect_is_called_certain_and_the_weak_one_is_not",
     ),
-    "test/sdimu_calibration/core/handheld/test_contradicted_priors.py": ("test_a_file_of_another_class_costs_a_note",),
     "test/sdimu_calibration/core/fleet/test_population.py": (
         "test_a_clean_fleet_has_a_unit_out_no_more_often_than_stated",
     ),
