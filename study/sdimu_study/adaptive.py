@@ -40,8 +40,8 @@ from sdimu_study.worlds import (
 )
 
 KINDS = ("table33", "clean", "hidden", "wide", "wide hidden")
-"""Clean tests to the accuracy of Table 3.3; clean tests, and tests with a hidden effect, to that of kim18. Wide: any
-IMU file of a table, at any latitude, in white noise or in flicker of its data sheet."""
+"""Clean tests to the accuracy of Table 3.3; clean tests, and tests with a hidden effect, to that of kim18. Wide:
+each of `IMUS`, at any latitude, in white noise or in flicker of its data sheet."""
 IMUS = ("dtg", "fog_tactical", "mems_industrial", "rlg_navigation")
 """IMU files of the wide tests: gyros that see the rotation of the Earth, without which no turn of a table is chosen."""
 FIXED = ("kim18", "recommended")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from resting import COUNT, START, give, messages
 
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.estimation.outcome import calibrate
@@ -14,7 +15,6 @@ from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
 from sdimu_calibration.nodes.feed import AWAY_S, Feed
 from sdimu_calibration.storage.bags.bag_reader import read_recording
-from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.journal import Journal, digest
 from sdimu_calibration.storage.files.result_file import read_result
@@ -22,31 +22,10 @@ from sdimu_calibration.storage.files.result_file import read_result
 from .conftest import FitSession, imu_stamps, samples_of, write_plan
 
 SITE, IMU, MODEL = load_site("daejeon"), load_imu("dtg"), load_model("baseline")
-START = 1_700_000_000 * NS
-COUNT, BLOCK = 4000, 20
-
-
-def messages(seed: int = 1, start: int = START) -> list[bytes]:
-    """Forty seconds at rest as raw messages."""
-    rng = np.random.default_rng(seed)
-    ns = start + (1 + np.arange(COUNT, dtype=np.int64)) * (NS // 100)
-    omega = 4e-5 + 1e-6 * rng.standard_normal((COUNT, 3))
-    return list(encode_imu(ns, omega, [0.0, 0.0, -9.8] + 1e-3 * rng.standard_normal((COUNT, 3))))
 
 
 def feed_of(path: Path) -> Feed:
     return Feed(lambda: LiveCalibration(OpeningOptions(IMU, SITE), MODEL), Journal(path, digest("same")))
-
-
-def give(feed: Feed, raw: list[bytes]) -> None:
-    """Hand over messages in blocks, as the node does, with a status every second."""
-    for k in range(0, len(raw), BLOCK):
-        for message in raw[k : k + BLOCK]:
-            feed.take_imu(message)
-        reached = feed.decode()
-        if reached:
-            feed.take_status(reached - reached % NS, True, 0)
-        list(feed.process(True, False))
 
 
 @pytest.fixture(scope="module")

@@ -108,6 +108,8 @@ def _dwells(windows: Windows, still: Bools) -> PhaseLog:
 class GrowingDwells:
     """The dwells of a test that is still going on, from the samples so far.
 
+    Soft beginnings of turns are found at the end alone: they are told by what comes after them.
+
     The test begins at rest, or the filter on the way has no attitude to begin with: the first windows show the usual
     reading of the gyros and its noise, later on all that were called rest. Half of the windows so far, the measure of a
     whole recording, may be one long turn. Only the last `_REMEMBERED` windows are kept, so that work and memory stay
