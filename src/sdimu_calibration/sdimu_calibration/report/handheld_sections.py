@@ -9,7 +9,7 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.diagnosis.verdict import shown
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, places
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures

@@ -18,8 +18,9 @@ from sdimu_calibration.core.effects import imu_model, registry
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.handheld_evidence import places
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, equations
+from sdimu_calibration.core.handheld.handheld_fit import equations
 from sdimu_calibration.core.handheld.handheld_scene import fit_priors
+from sdimu_calibration.core.handheld.run_scatter import FORCE
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.diagnosis_file import content

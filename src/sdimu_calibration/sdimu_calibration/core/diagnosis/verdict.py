@@ -14,7 +14,7 @@ from sdimu_calibration.core.error_figures import held_out, held_out_judged, nois
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
 from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities

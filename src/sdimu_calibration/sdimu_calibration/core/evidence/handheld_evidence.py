@@ -17,7 +17,8 @@ from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.consistency import StopMean
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, seen_at_rest, turns
-from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, row_sigmas
+from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, scatter_of
+from sdimu_calibration.core.handheld.run_scatter import PRIOR
 from sdimu_calibration.core.specification import ImuSpecification
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn_north", "turn_east", "turn_down")
@@ -79,9 +80,9 @@ def handheld_evidence(
         Gives candidates their prior.
     """
     k, q = len(run.t), len(scene.kept)
-    rows, residual, kind = equations(run, scene, point)
-    sigma = row_sigmas(run, scene, kind, point.extra)
-    data = kind >= 0
+    rows, residual = equations(run, scene, point)
+    scatter = scatter_of(run, scene)
+    sigma, data = scatter.sigmas(point.extra), scatter.kind != PRIOR
     attitude, coefficient, earth = np.split(rows[data], [3 * k, 3 * k + q], axis=1)
     W = -np.hstack([coefficient, earth, attitude]) / sigma[data, None]
     held = np.full(3 * k, _ANY_ATTITUDE**-2)

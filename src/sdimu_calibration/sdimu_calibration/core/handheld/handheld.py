@@ -22,8 +22,9 @@ from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.data.trembling_rests import STEPS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_run
 from sdimu_calibration.core.handheld.handheld_faults import without_impossible
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN, FitPriors, HandheldSolution
+from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution
 from sdimu_calibration.core.handheld.rest_choice import FEWEST_RESTS, ChosenRests, choose_rests
+from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
 from sdimu_calibration.core.handheld.whole_turns import whole_turns, with_whole_turns
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault, Recording

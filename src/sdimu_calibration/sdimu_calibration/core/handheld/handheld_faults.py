@@ -15,7 +15,8 @@ from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.gaps import open_angle, step_fault, told_together
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, TURN, HandheldSolution
+from sdimu_calibration.core.handheld.handheld_fit import HandheldSolution
+from sdimu_calibration.core.handheld.run_scatter import FORCE, TURN
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, Recording

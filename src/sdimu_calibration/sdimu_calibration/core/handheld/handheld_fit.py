@@ -8,24 +8,21 @@ all whitened:
     attitude of the next rest against the gyros' turn = noise over the turn, that wandering, and a share of the angle
     priors of the coefficients and of w_e; one free heading, held.
 
-What is more than the white noise is not specified by anybody for a cheap IMU in a hand, so three sigmas are learned:
-each is as large as makes the squared residuals of its equations as many as their redundancy (the moment estimate of
-Paule & Mandel, J. Res. NBS 87, 1982; for least squares, Koch, *Parameter Estimation and Hypothesis Testing in Linear
-Models*, section 3.6).
+What is more than white noise is learned (`run_scatter`), or given where other recordings tell it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.handheld.forces_ahead import ForcesAhead, forces_ahead
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_rest, turns
+from sdimu_calibration.core.handheld.run_scatter import RunScatter, learned, run_scatter
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Rest
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector, skew
@@ -43,15 +40,10 @@ MOST_RESTS = 400
 """Number of rests at most: the least squares is dense, and a thousand unknowns take a second a step."""
 _HEADING = 1e-6
 """Sigma that holds the heading of the first rest (rad): the heading is free and says nothing about any coefficient."""
+_OTHER_PRIORS = 4
+"""Number of priors beside those of the coefficients: three of the Earth's rate, one of the heading."""
 _SWINGS = 0.5
 """Negative cosine of the angle between two steps (1) from which they swing: steps that settle go on or turn aside."""
-_HEADING_STEP = 1e-3
-"""Sigma of a step of a heading that nothing tells (rad): small enough to hold it, large enough to invert."""
-_BISECTIONS = 50
-"""Number of halvings: to rounding."""
-
-FORCE, RATE, TURN, WHOLE = 0, 1, 2, 3
-"""The kinds of equation; the scatter of the first three is learned, that of whole turns is stated."""
 
 
 @dataclass(frozen=True)
@@ -108,22 +100,30 @@ class HandheldSolution:
     steps: int
 
 
-def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> HandheldSolution:
-    """Gauss-Newton with the sigmas learned on the way."""
+def fit_run(
+    run: HandheldRun, scene: FitPriors, start: LinearisationPoint, given: Floats | None = None
+) -> HandheldSolution:
+    """Gauss-Newton with the sigmas learned on the way.
+
+    Parameters
+    ----------
+    given : ndarray, shape (3,), optional
+        Sigmas beyond white noise, as of ``LinearisationPoint.extra``: they are taken instead of learned.
+    """
     if len(run.t) > MOST_RESTS:
         raise DataError(
             f"/imu/data_raw: {len(run.t)} rests; a handheld run may have {MOST_RESTS}: cut the recording in parts"
         )
-    point = start
+    scatter = scatter_of(run, scene)
+    point = start if given is None else replace(start, extra=given)
     change, pace, last = np.zeros(3), 1.0, np.zeros(0)
     for steps in range(1, MOST_STEPS + 1):
-        rows, residual, kind = equations(run, scene, point)
-        # A heading after a turn that nobody saw stays where it is: the Earth tells it so badly that no search for it
-        # ends, and what it is wrong by is learned as scatter of the rates.
-        sigma = np.where(_unseen(run, kind), _HEADING_STEP, row_sigmas(run, scene, kind, point.extra))
+        rows, residual = equations(run, scene, point)
+        sigma = scatter.sigmas_of_step(point.extra)
         Q, R, white = _solve(rows, residual, sigma)
         step = np.asarray(-np.linalg.solve(R, Q.T @ white))
-        extra = _learn(run, scene, kind, point.extra, rows, residual, step)
+        free = 1.0 - np.sum(Q**2, axis=1)
+        extra = learned(scatter, point.extra, residual + rows @ step, free) if given is None else given
         moved = float(np.max(np.abs(R[-len(scene.kept) - 3 : -3] @ step)))
         # A hundredth of a sigma that is known to a tenth; half steps, as weights and residuals chase each other.
         settled = bool(np.all(np.abs(extra - point.extra) <= 1e-2 * extra + 1e-12))
@@ -137,11 +137,16 @@ def fit_run(run: HandheldRun, scene: FitPriors, start: LinearisationPoint) -> Ha
         if not np.isfinite(step).all():
             break
         if moved < CONVERGED and settled and steps > 2:
-            return _finish(run, scene, point, steps)
+            return _finish(run, scene, scatter, point, steps)
     raise DataError(
         f"the handheld run does not fit any IMU of the specification: check the units, and that {Option.IMU} is as "
         "wide as the sensor's errors"
     )
+
+
+def scatter_of(run: HandheldRun, scene: FitPriors) -> RunScatter:
+    """Make the variances of all equations of a run."""
+    return run_scatter(run, scene.gyro_white_noise, scene.accel_white_noise, len(scene.kept) + _OTHER_PRIORS)
 
 
 def _pace(pace: float, change: Floats, before: Floats) -> float:
@@ -162,7 +167,7 @@ def _moved(point: LinearisationPoint, step: Floats, scene: FitPriors) -> Lineari
     return replace(point, coefficients=coefficients, C_nb=C_nb, earth=point.earth + step[-3:])
 
 
-def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> tuple[Floats, Floats, Ints]:
+def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> tuple[Floats, Floats]:
     """Make the equations about a point.
 
     Unknowns in this order: turns of the rests, coefficients, Earth rate. Equations in this order: six of each rest,
@@ -174,8 +179,6 @@ def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> 
         Change of each residual per unit of each unknown (SI).
     residual : ndarray, shape (m,)
         SI; of priors whitened.
-    kind : ndarray of int, shape (m,)
-        `FORCE`, `RATE`, `TURN` or `WHOLE`; -1 for priors.
     """
     k, q = len(run.t), len(scene.kept)
     model = scene.model
@@ -213,22 +216,14 @@ def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> 
     for row, i in enumerate(run.whole, start=9 * k - 3):
         rows[row, [3 * i + 2, 3 * i + 5]] = -1.0, 1.0
         residual[row] = rotation_vector(point.C_nb[i + 1] @ point.C_nb[i].T)[2]
-    kind = np.concatenate(
-        [
-            np.tile([RATE] * 3 + [FORCE] * 3, k),
-            np.full(3 * (k - 1), TURN),
-            np.full(len(run.whole), WHOLE),
-            np.full(q + 4, -1),
-        ]
-    )
     more, left = _priors(scene, point, rows.shape[1])
-    return np.vstack([rows, more]), np.concatenate([residual, left]), kind
+    return np.vstack([rows, more]), np.concatenate([residual, left])
 
 
 def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Floats, Floats]:
     """Whitened rows of what is known before."""
     q = len(scene.kept)
-    rows, residual = np.zeros((q + 4, width)), np.zeros(q + 4)
+    rows, residual = np.zeros((q + _OTHER_PRIORS, width)), np.zeros(q + _OTHER_PRIORS)
     white = np.linalg.inv(np.linalg.cholesky(scene.prior))
     rows[:q, width - 3 - q : width - 3] = white
     residual[:q] = white @ point.coefficients[scene.kept]
@@ -238,118 +233,23 @@ def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Fl
     return rows, residual
 
 
-def row_sigmas(run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats) -> Floats:
-    """Sigma of every equation in the unit of its residual (SI), shape (m,).
-
-    Parameters
-    ----------
-    kind : ndarray of int, shape (m,)
-        As `equations` gives it.
-    extra : ndarray, shape (3,)
-        Learned sigmas, as of `LinearisationPoint`.
-    """
-    white, more = _variances(run, scene, extra)
-    return np.asarray(np.sqrt(_spread(run, kind, white + more)))
-
-
-def _variances(run: HandheldRun, scene: FitPriors, extra: Floats) -> tuple[Floats, Floats]:
-    """Variance of the rate and force at each rest and of each turn, (3 k - 1,): by white noise and sway, and beyond."""
-    k = len(run.t)
-    angle, speed = run.sway.angle**2, run.sway.speed**2
-    # What a rest begins with and what it ends with are two draws of its sway, and a turn begins and ends with one.
-    white = np.concatenate(
-        [
-            scene.gyro_white_noise**2 / run.seconds + 2.0 * angle / run.seconds**2,
-            scene.accel_white_noise**2 / run.seconds + 2.0 * speed / run.seconds**2,
-            scene.gyro_white_noise**2 * run.turn_s + run.gap**2 + angle[:-1] + angle[1:],
-        ]
-    )
-    more = np.concatenate(
-        [
-            np.full(k, extra[RATE] ** 2),
-            np.full(k, extra[FORCE] ** 2),
-            (extra[RATE] * run.turn_s) ** 2 + (extra[TURN] * run.path) ** 2,
-        ]
-    )
-    return white, more
-
-
-def _spread(run: HandheldRun, kind: Ints, by_group: Floats) -> Floats:
-    """Values by rest and turn (3 k - 1,) to the rows; priors are whitened already and take 1."""
-    k = len(run.t)
-    out = np.ones(len(kind))
-    at_rest = np.stack([by_group[:k], by_group[:k], by_group[:k], *[by_group[k : 2 * k]] * 3], axis=1)
-    out[: 6 * k] = at_rest.ravel()
-    out[6 * k : 9 * k - 3] = np.repeat(by_group[2 * k :], 3)
-    out[9 * k - 3 : 9 * k - 3 + len(run.whole)] = run.whole_sigma**2
-    return out
-
-
-def _unseen(run: HandheldRun, kind: Ints) -> Bools:
-    """Rows of turns that say nothing, shape (m,)."""
-    k = len(run.t)
-    out = np.zeros(len(kind), dtype=bool)
-    out[6 * k : 9 * k - 3] = np.repeat(run.unseen, 3)
-    return out
-
-
 def _solve(rows: Floats, residual: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
     """QR of the whitened rows, and the whitened residual."""
     Q, R = np.linalg.qr(rows / sigma[:, None])
     return np.asarray(Q), np.asarray(R), np.asarray(residual / sigma)
 
 
-def _learn(
-    run: HandheldRun, scene: FitPriors, kind: Ints, extra: Floats, rows: Floats, residual: Floats, step: Floats
-) -> Floats:
-    """Learn the sigmas beyond white noise from what the step leaves over.
-
-    Each is searched with the redundancies of the present weights; Gauss-Newton repeats it until both stand.
-    """
-    left = residual + rows @ step
-    sigma = row_sigmas(run, scene, kind, extra)
-    Q = np.linalg.qr(rows / sigma[:, None])[0]
-    seen = ~_unseen(run, kind)
-    free = 1.0 - np.sum(Q**2, axis=1)
-    out = extra.copy()
-    for which in (FORCE, RATE, TURN):
-        mine = (kind == which) & seen
-        if not mine.any():
-            continue
-
-        def excess(
-            value: float, which: int = which, mine: Bools = mine, target: float = float(free[mine].sum())
-        ) -> float:
-            trial = out.copy()
-            trial[which] = value
-            return float(np.sum((left[mine] / row_sigmas(run, scene, kind, trial)[mine]) ** 2)) - target
-
-        out[which] = _root(excess, float(np.sqrt(np.mean(left[mine] ** 2))))
-    return out
-
-
-def _root(excess: Callable[[float], float], scale: float) -> float:
-    """Smallest value >= 0 at which a falling function is no more above zero, by bisection."""
-    low, high = 0.0, scale
-    if excess(0.0) <= 0.0:
-        return 0.0
-    while excess(high) > 0.0:
-        high *= 2.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    return high
-
-
-def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps: int) -> HandheldSolution:
+def _finish(
+    run: HandheldRun, scene: FitPriors, scatter: RunScatter, point: LinearisationPoint, steps: int
+) -> HandheldSolution:
     """Put the statistics together."""
-    rows, residual, kind = equations(run, scene, point)
-    sigma = row_sigmas(run, scene, kind, point.extra)
+    rows, residual = equations(run, scene, point)
+    sigma = scatter.sigmas(point.extra)
     Q, R, white = _solve(rows, residual, sigma)
     k, q = len(run.t), len(scene.kept)
     inverse = np.linalg.inv(R)
     covariance = inverse @ inverse.T
-    measured = (kind >= 0) & ~_unseen(run, kind)
+    measured = scatter.measured
     log = -float(np.sum(np.log(sigma[measured]))) - 0.5 * int(measured.sum()) * np.log(2.0 * np.pi)
     # The determinant of the priors too: without it a coefficient more would count by its unit.
     log += float(np.sum(np.log(np.diag(np.linalg.inv(np.linalg.cholesky(scene.prior))))))
@@ -372,13 +272,13 @@ def _finish(run: HandheldRun, scene: FitPriors, point: LinearisationPoint, steps
 def rests_with_residuals(run: HandheldRun, scene: FitPriors, found: HandheldSolution) -> tuple[Rest, ...]:
     """List the rests with what the fit leaves over at each, and on the way to it."""
     k = len(run.t)
-    white, more = _variances(run, scene, found.point.extra)
-    sigma = np.sqrt(white + more)
+    sigma = scatter_of(run, scene).sigmas(found.point.extra)
+    at_rest, of_turn = sigma[: 6 * k].reshape(k, 6), sigma[6 * k : 9 * k - 3 : 3]
     none = np.full((1, 3), np.nan)
     turn = np.vstack([none, np.where(run.unseen[:, None], np.nan, found.turn_residual)])
-    turn_sigma = np.concatenate([[np.nan], np.where(run.unseen, np.nan, sigma[2 * k :])])
+    turn_sigma = np.concatenate([[np.nan], np.where(run.unseen, np.nan, of_turn)])
     start, end = run.t - 0.5 * run.seconds, run.t + 0.5 * run.seconds
-    numbers = np.column_stack([start, end, found.rest_residual, turn, sigma[:k], sigma[k : 2 * k], turn_sigma])
+    numbers = np.column_stack([start, end, found.rest_residual, turn, at_rest[:, 0], at_rest[:, 3], turn_sigma])
     ahead = zip(found.ahead.error.tolist(), found.ahead.sigma.tolist(), strict=True)
     return tuple(
         Rest(a, b, (wx, wy, wz), (fx, fy, fz), (n, e, d), rate, force, way, (ex, ey, ez), (sx, sy, sz))

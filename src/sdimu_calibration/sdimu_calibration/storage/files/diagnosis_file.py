@@ -24,7 +24,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.fleet.common import STEPS, Bytes
-from sdimu_calibration.core.handheld.handheld_fit import FORCE, RATE, TURN
+from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
