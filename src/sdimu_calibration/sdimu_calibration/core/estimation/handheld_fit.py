@@ -22,6 +22,7 @@ from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.handheld import PreparedRun, handheld_notes
 from sdimu_calibration.core.handheld.handheld_faults import data_faults
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution, rests_with_residuals
+from sdimu_calibration.core.handheld.run_rows import RunRows, run_rows
 from sdimu_calibration.core.recording import DataError, DataFault
 from sdimu_calibration.core.results import Rest
 from sdimu_calibration.core.site_reference import Reference, found
@@ -123,6 +124,10 @@ class HandheldFit(Fit):
     def evidence(self, effects: Sequence[Effect] = ()) -> HandheldEvidence:
         """Residuals of rests and turns about this fit, and the signatures of its parameters and those of `effects`."""
         return handheld_evidence(self.ready.run, self.priors, self.solution.point, effects, self.test.imu)
+
+    def rows(self) -> RunRows:
+        """Equations about this fit, for recordings that learn their scatter together."""
+        return run_rows(self.ready.run, self.priors, self.solution.point)
 
     def added_columns(self, count: int) -> Ints:
         """Columns in `evidence` of the last `count` parameters of the model."""

@@ -88,4 +88,4 @@ def _fit(test: PreparedTest, model: Model, start: Start | None, progress: Progre
         point = LinearisationPoint(
             start.coefficients_of(inner.names), start.C_nb, start.more[:3].copy(), start.more[3:].copy()
         )
-    return HandheldFit(test, model, sensors, ready, priors, fit_run(ready.run, priors, point))
+    return HandheldFit(test, model, sensors, ready, priors, fit_run(ready.run, priors, point, test.scatter))

@@ -10,6 +10,7 @@ from typing import Any
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
 from sdimu_calibration.core.alignment.without import without
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, Told, prepare_run
@@ -38,6 +39,8 @@ class PreparedTest:
         Of a run by hand: how well the IMU was put back after whole turns about the vertical (rad); 0 for none.
     rests : tuple of (float, float)
         Of a run by hand: when the IMU rested (s), as stated; without any the rests are found.
+    scatter : ndarray, shape (3,), optional
+        Of a run by hand: sigmas beyond white noise, as of `RunScatter.sigmas`, where other recordings tell them.
     origin : Origin
         What the bag and the user say of the unit; an outcome adds what the recording says.
     """
@@ -50,6 +53,7 @@ class PreparedTest:
     assumed_site: str = ""
     whole_turns: float = 0.0
     rests: tuple[tuple[float, float], ...] = ()
+    scatter: Floats | None = None
     origin: Origin = field(default_factory=Origin)
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -98,6 +102,16 @@ class PreparedTest:
     def with_imu(self, imu: ImuSpecification) -> PreparedTest:
         """Take other white noise or priors for the fits; phases and data faults stay as they were decided."""
         return replace(self, imu=imu)
+
+    def with_scatter(self, scatter: Floats | None) -> PreparedTest:
+        """Take sigmas beyond white noise for a run by hand, in place of learning them.
+
+        Parameters
+        ----------
+        scatter : ndarray, shape (3,), or None
+            As of `RunScatter.sigmas` (SI); None learns them.
+        """
+        return replace(self, scatter=scatter)
 
     def data(self, setup: TestSetup) -> PreparedData:
         """Cycles, epochs and phases for the navigation, made once."""

@@ -40,7 +40,7 @@ MOST_RESTS = 400
 """Number of rests at most: the least squares is dense, and a thousand unknowns take a second a step."""
 _HEADING = 1e-6
 """Sigma that holds the heading of the first rest (rad): the heading is free and says nothing about any coefficient."""
-_OTHER_PRIORS = 4
+OTHER_PRIORS = 4
 """Number of priors beside those of the coefficients: three of the Earth's rate, one of the heading."""
 _SWINGS = 0.5
 """Negative cosine of the angle between two steps (1) from which they swing: steps that settle go on or turn aside."""
@@ -146,7 +146,7 @@ def fit_run(
 
 def scatter_of(run: HandheldRun, scene: FitPriors) -> RunScatter:
     """Make the variances of all equations of a run."""
-    return run_scatter(run, scene.gyro_white_noise, scene.accel_white_noise, len(scene.kept) + _OTHER_PRIORS)
+    return run_scatter(run, scene.gyro_white_noise, scene.accel_white_noise, len(scene.kept) + OTHER_PRIORS)
 
 
 def _pace(pace: float, change: Floats, before: Floats) -> float:
@@ -223,7 +223,7 @@ def equations(run: HandheldRun, scene: FitPriors, point: LinearisationPoint) -> 
 def _priors(scene: FitPriors, point: LinearisationPoint, width: int) -> tuple[Floats, Floats]:
     """Whitened rows of what is known before."""
     q = len(scene.kept)
-    rows, residual = np.zeros((q + _OTHER_PRIORS, width)), np.zeros(q + _OTHER_PRIORS)
+    rows, residual = np.zeros((q + OTHER_PRIORS, width)), np.zeros(q + OTHER_PRIORS)
     white = np.linalg.inv(np.linalg.cholesky(scene.prior))
     rows[:q, width - 3 - q : width - 3] = white
     residual[:q] = white @ point.coefficients[scene.kept]

@@ -24,6 +24,7 @@ from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
+from sdimu_calibration.core.handheld.run_rows import RunRows
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
@@ -74,6 +75,8 @@ class Job:
     """Where an earlier fit of the recording ended: gives the attitude."""
     noise: tuple[NoiseTerm, ...] | None = None
     """Noise with a memory, where it is known; None learns it."""
+    scatter: Floats | None = None
+    """Of a run by hand, sigmas beyond white noise that the set tells, shape (3,); None learns them."""
     stretches: bool = False
     """Signatures of an error of each sensor in each dwell and turn, in place of candidates."""
     function: SharedFunction | None = None
@@ -125,6 +128,10 @@ class Report:
     rivals: tuple[InOneNoise, ...] = ()
     """What it says in each noise that it may have, where it was asked for; empty for a run by hand, which learns its
     scatter instead."""
+    by_hand: RunRows | None = None
+    """Equations of a run by hand, from which the set learns the scatter."""
+    scatter: Floats | None = None
+    """That of the set in which the rows are, shape (3,); None is the run's own."""
 
     @property
     def stands_alone(self) -> bool:
@@ -159,6 +166,7 @@ def fitted(job: Job) -> Fit:
     model = replace(job.model, effects=(*_of_all(job.model.effects, job), *job.local))
     if job.imu is not None:
         test = test.with_imu(job.imu)
+    test = test.with_scatter(job.scatter)
     if job.about is None or test.why_handheld or job.estimator == HandheldFit.estimator:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
@@ -237,7 +245,17 @@ def _report(job: Job, fit: Fit) -> Report:
         places,
         fit.test.site,
         tuple(replace(one, names=(*rows.names, *rows.labels)) for one in rivals),
+        _equations(fit, job),
+        job.scatter,
     )
+
+
+def _equations(fit: Fit, job: Job) -> RunRows | None:
+    """Equations of a run by hand in the names of the set."""
+    if not isinstance(fit, HandheldFit):
+        return None
+    rows, local = fit.rows(), _local_names(job)
+    return replace(rows, names=tuple(tagged(n, job.member.name) if n in local else n for n in rows.names))
 
 
 def _statistics(fit: Fit, job: Job) -> FitStatistics:

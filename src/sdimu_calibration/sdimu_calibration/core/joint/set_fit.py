@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.combine import Combination, Component, JointEs
 from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
 from sdimu_calibration.core.joint.member import Job, Member, Report, fitted
 from sdimu_calibration.core.joint.same_unit import check_one_unit
-from sdimu_calibration.core.joint.scope import by_name, split_tag
+from sdimu_calibration.core.joint.scope import by_name, split_tag, tagged
 from sdimu_calibration.core.joint.set_order import (
     check_different,
     check_members,
@@ -29,6 +29,7 @@ from sdimu_calibration.core.joint.set_order import (
     in_order,
 )
 from sdimu_calibration.core.joint.shared_function import SharedFunction
+from sdimu_calibration.core.joint.shared_scatter import shared_scatter
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
@@ -207,6 +208,7 @@ def fit_set(
     if left and len(fit.reports) < 2:
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
         raise DataError(f"only one of {len(members)} recordings can be used, and a set needs two ({why})")
+    fit = _in_shared_scatter(fit, options, run)
     late = {name: r for name, r in late.items() if name not in left}
     fit = _noise_of(late, fit, options, run) if late else fit
     return replace(fit, left_out=tuple(left.items()), unit_doubt=doubt)
@@ -218,6 +220,30 @@ def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run:
     done = run([job_of(m, options, fit) for m in members])
     fresh = {m.name: d for m, d in zip(members, done, strict=True) if not isinstance(d, DataError)}
     return with_reports(fit, [with_own(fresh.get(r.name, r), r) for r in fit.reports])
+
+
+def _in_shared_scatter(fit: SetFit, options: SetOptions, run: Run) -> SetFit:
+    """Let runs by hand learn their scatter together, and fit each in it."""
+    runs = {r.name: r.by_hand for r in fit.reports if r.by_hand is not None}
+    varying = [n for names in fit.varying.values() for n in names] if len(fit.power_ons) > 1 else []
+    own = {r.name: {n: tagged(n, power_on(r)) for n in varying} for r in fit.reports}
+    found = shared_scatter(runs, dict(zip(fit.names, fit.weight.tolist(), strict=True)), own)
+    asked = [k for k, r in enumerate(fit.reports) if r.name in runs and not _same(r.scatter, found.get(r.name))]
+    if not asked:
+        return fit
+    jobs = [
+        replace(job_of(fit.members[k], options, fit), scatter=found.get(fit.reports[k].name), noise=()) for k in asked
+    ]
+    reports = list(fit.reports)
+    for k, fresh in zip(asked, run(jobs), strict=True):
+        if not isinstance(fresh, DataError):
+            reports[k] = with_own(fresh, fit.reports[k])
+    return with_reports(fit, reports)
+
+
+def _same(one: Floats | None, other: Floats | None) -> bool:
+    """Whether two scatters are the same, or both a run's own."""
+    return one is other if one is None or other is None else bool(np.array_equal(one, other))
 
 
 def _why(member: Member, error: DataError) -> str:
@@ -257,6 +283,7 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
             report.imu,
             report.start,
             None if learn else report.noise,
+            report.scatter,
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
     return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())

@@ -242,7 +242,12 @@ def _misfit(fit: SetFit) -> list[Note]:
 
 
 def worst_figure(report: Report) -> float:
-    """Give the worse of NIS and held-out error (1), as a recording by itself is judged: above `MISFIT` no fit."""
+    """Give the worse of NIS and held-out error (1), as a recording by itself is judged: above `MISFIT` no fit.
+
+    A run by hand learns its scatter, alone or with the others, and is not judged by what is left over its scatter.
+    """
+    if report.by_hand is not None:
+        return 0.0
     figures = report.statistics.judged(may_be_an_effect(report.noise))
     return max((x for x in figures if x is not None and not np.isnan(x)), default=0.0)
 

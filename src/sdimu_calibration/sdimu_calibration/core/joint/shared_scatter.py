@@ -1,0 +1,147 @@
+"""One scatter of the recordings by hand of a set, learned about coefficients that all of them share.
+
+A run of few rests learns its scatter from what its own coefficients leave over, which is little: by chance far too
+small, and the coefficients then seem to differ from recording to recording. All runs of a set together leave over more.
+A run has a scatter of its own where the likelihood of what it leaves over says so (by more than the Bayesian
+information criterion counts for three parameters; G. Schwarz, Ann. Stat. 6, 1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.handheld.run_rows import RunRows
+from sdimu_calibration.core.handheld.run_scatter import WHOLE, learned, stacked_scatters
+
+_MOST_STEPS = 40
+"""Number of steps at most: weights and residuals follow each other, and each step halves what is left."""
+_STANDS = 1e-2
+"""Share of a learned sigma by which a step changes it at most where it stands: it is known to a tenth."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One run in the parameters of the set."""
+
+    rows: RunRows
+    place: Ints
+    """Of its coefficients among the parameters of the set, shape (q,)."""
+
+
+def shared_scatter(
+    runs: Mapping[str, RunRows], weight: Mapping[str, float], own: Mapping[str, Mapping[str, str]]
+) -> dict[str, Floats]:
+    """Learn the scatter that runs share.
+
+    Parameters
+    ----------
+    runs : mapping of str to RunRows
+        By recording.
+    weight : mapping of str to float
+        Prior information of the coefficients (1/SI^2), prior mean zero.
+    own : mapping of str to mapping of str to str
+        By recording, names for the set of coefficients that are not the same in all recordings.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (3,)
+        Sigmas as of `RunScatter.sigmas`, of the recordings that share them.
+    """
+    if len(runs) < 2:
+        return {}
+    named = {name: [own.get(name, {}).get(n, n) for n in r.names] for name, r in runs.items()}
+    columns = list(dict.fromkeys(n for names in named.values() for n in names))
+    known = np.zeros(len(columns))
+    for name, rows in runs.items():
+        known[[columns.index(n) for n in named[name]]] = [weight[n] for n in rows.names]
+    put = {n: _Run(rows, np.array([columns.index(c) for c in named[n]], dtype=np.int64)) for n, rows in runs.items()}
+    sharing = list(runs)
+    while len(sharing) > 1:
+        extra, left, free = _learned(put, sharing, known)
+        apart = [n for n in sharing if _has_its_own(runs[n], extra, left[n], free[n])]
+        if not apart:
+            return dict.fromkeys(sharing, extra)
+        # The one that scatters most first: it alone may make the scatter too large for the others.
+        sharing.remove(max(apart, key=lambda n: _excess(runs[n], extra, left[n], free[n])))
+    return {}
+
+
+def _learned(
+    runs: Mapping[str, _Run], sharing: Sequence[str], weight: Floats
+) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
+    """Learn the scatter of some runs beside the own one of the others; residuals (SI) and redundancies by run."""
+    scatter = stacked_scatters([runs[n].rows.scatter for n in sharing])
+    extra: Floats = np.sqrt(np.mean([runs[n].rows.extra ** 2 for n in sharing], axis=0))
+    for _ in range(_MOST_STEPS):
+        left, free = _left_over(runs, dict.fromkeys(sharing, extra), weight)
+        before = extra
+        extra = learned(
+            scatter, extra, np.concatenate([left[n] for n in sharing]), np.concatenate([free[n] for n in sharing])
+        )
+        if np.all(np.abs(extra - before) <= _STANDS * extra + 1e-12):
+            break
+    return extra, left, free
+
+
+def _left_over(
+    runs: Mapping[str, _Run], given: Mapping[str, Floats], weight: Floats
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Estimate coefficients from all runs, each in its scatter; residuals (SI) and redundancies of each run."""
+    J, d = np.diag(weight), np.zeros(len(weight))
+    parts = {}
+    for name, run in runs.items():
+        sigma = run.rows.scatter.sigmas_of_step(given.get(name, run.rows.extra))
+        Q = np.linalg.qr(run.rows.own / sigma[:, None])[0]
+        A, r = run.rows.shared / sigma[:, None], run.rows.residual / sigma
+        A, r = A - Q @ (Q.T @ A), r - Q @ (Q.T @ r)
+        J[np.ix_(run.place, run.place)] += A.T @ A
+        d[run.place] += A.T @ (A @ run.rows.point - r)
+        parts[name] = sigma, Q, A, r
+    # In units in which every parameter has an information of one: SI units differ by many orders.
+    unit = 1.0 / np.sqrt(np.diag(J))
+    root = unit[:, None] * np.linalg.inv(np.linalg.cholesky(J * np.outer(unit, unit))).T
+    estimate = root @ (root.T @ d)
+    left, free = {}, {}
+    for name, (sigma, Q, A, r) in parts.items():
+        run = runs[name]
+        left[name] = sigma * (r + A @ (estimate[run.place] - run.rows.point))
+        free[name] = 1.0 - np.sum(Q**2, axis=1) - np.sum((A @ root[run.place]) ** 2, axis=1)
+    return left, free
+
+
+def _has_its_own(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> bool:
+    """Whether what a run leaves over is so much likelier in a scatter of its own."""
+    counts = _counted(rows)
+    better = _log_likelihood(rows, _alone(rows, extra, left, free), left, free, counts)
+    better -= _log_likelihood(rows, extra, left, free, counts)
+    return better > 0.5 * len(extra) * float(np.log(max(free[counts].sum(), 2.0)))
+
+
+def _excess(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> float:
+    """Squares of what a run leaves over, per redundancy (1)."""
+    counts = _counted(rows)
+    return float(np.sum((left / rows.scatter.sigmas(extra))[counts] ** 2) / max(free[counts].sum(), 1.0))
+
+
+def _counted(rows: RunRows) -> Bools:
+    """Equations whose scatter is learned, shape (m,)."""
+    return np.asarray(rows.scatter.measured & (rows.scatter.kind != WHOLE))
+
+
+def _alone(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> Floats:
+    """Sigmas that make the squares of one run as many as its redundancies, shape (3,)."""
+    for _ in range(_MOST_STEPS):
+        before, extra = extra, learned(rows.scatter, extra, left, free)
+        if np.all(np.abs(extra - before) <= _STANDS * extra + 1e-12):
+            break
+    return extra
+
+
+def _log_likelihood(rows: RunRows, extra: Floats, left: Floats, free: Floats, counts: Bools) -> float:
+    """Log-likelihood of what is left over, each equation counted by its redundancy."""
+    variance = rows.scatter.sigmas(extra)[counts] ** 2
+    return -0.5 * float(np.sum(free[counts] * np.log(variance) + left[counts] ** 2 / variance))
