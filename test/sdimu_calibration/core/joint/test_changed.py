@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sdimu_calibration.core.advice import Kind
-from sdimu_calibration.core.joint.set_diagnosis import diagnose_set, sites_to_check
+from sdimu_calibration.core.joint.set_diagnosis import _advice, diagnose_set, sites_to_check
 from sdimu_calibration.core.joint.set_evidence import set_evidence
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
-from sdimu_calibration.core.joint.set_verdict import SetFinding
+from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, _found
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.advice_words import sentence
 
@@ -55,6 +57,28 @@ def test_a_site_is_to_be_checked_where_all_three_differ_alike():
     assert told.arguments == ("r2", "100.0 +- 2.9 ppm")
     assert sites_to_check([x, y]) == []
     assert sites_to_check([x, y, changed("z", 60.0)]) == []
+
+
+def many(against):
+    """Five coefficients that are others in one recording."""
+    return [replace(changed(axis, ppm), against=against) for axis, ppm in zip("xyzxy", range(50, 100, 10), strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("against", "says"), [("r1", "r1 and r2 differ in 5 coefficients"), ("", "in r2, the unit differs in 5")]
+)
+def test_so_many_coefficients_that_changed_are_told_as_another_unit_or_other_axes(against, says):
+    told = _found(Verdict.DATA_FAULT, SetFacts(many(against), None, None, None, None))
+    assert told.startswith(f"Not one unit, or one that was changed, or axes or units that are read otherwise: {says}")
+    few = _found(Verdict.DATA_FAULT, SetFacts(many(against)[:3], None, None, None, None))
+    assert few.startswith("All recordings agree but for")
+
+
+@pytest.mark.parametrize(("against", "kind"), [("r1", Kind.RECORD_A_THIRD), ("", Kind.LOOK_AT_RECORDING)])
+def test_one_advice_stands_for_all_that_changed_in_a_recording(against, kind):
+    (told,) = _advice(Verdict.DATA_FAULT, many(against), (), ())
+    assert told.kind == kind
+    assert "accel_scale_x, accel_scale_y, accel_scale_z, accel_scale_x and others" in told.arguments
 
 
 @pytest.mark.parametrize("which", [0, 1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,10 @@ from sdimu_calibration.core.joint.member import Member, fitted, run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.joint.variation import _scatter, variation
+from sdimu_calibration.core.note import Topic, topic_of
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.score import baseline_z
 
@@ -126,6 +129,17 @@ def test_a_coefficient_that_follows_the_date_is_told(options):
     assert (first.name, first.covariate) == ("accel_scale_x", "date (d)")
     assert first.slope == pytest.approx(8e-6, abs=4.0 * first.sigma)
     assert any("accel_scale_x is not the same in all recordings" in line for line in result.warnings)
+
+
+def test_many_coefficients_that_differ_are_told_in_one_line_and_two_recordings_follow_nothing(options):
+    shift = {"accel_scale_x": 6e-5, "accel_scale_y": -6e-5, "accel_scale_z": 5e-5, "gyro_scale_z": 4e-5}
+    result = set_outcome(fit_set(unit_set(17, [short()] * 2, shift={1: shift}).members, options, here))
+    told = [line for line in result.warnings if topic_of(line) == Topic.DIFFERS]
+    assert len(told) == 1
+    assert re.match(r"[4-9] of 2\d coefficients are not the same in all recordings", told[0])
+    assert "changed between the recordings" in told[0]
+    assert result.of_set.trends == ()
+    assert topic_of(as_note(str(told[0]))) == Topic.DIFFERS
 
 
 def test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_takes_it_in(options):

@@ -89,8 +89,8 @@ def _open_words(strange: Report, others: Sequence[Report]) -> str:
     whose = "the others are" if len(others) > 1 else f"'{others[0].name}' is"
     return (
         f"the data do not tell whether '{strange.name}' is of the unit that {whose} of, in the same axes: too few of "
-        "its coefficients are known in all recordings; look at its wiring and mount, or record it with turns about "
-        "other axes"
+        "its coefficients are known in all recordings, or two units of this IMU file may be as alike; look at its "
+        "wiring and mount, or record it with turns about other axes"
     )
 
 

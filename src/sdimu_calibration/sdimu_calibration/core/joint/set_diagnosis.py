@@ -30,6 +30,7 @@ from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outc
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
 from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, sentence, verdict_of_set
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
@@ -263,6 +264,15 @@ def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:
     return out
 
 
+def _of_recordings(findings: Sequence[SetFinding]) -> dict[tuple[str, str], str]:
+    """List what each recording alone shows, by the recording and that against which it stands."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for f in findings:
+        if f.recording:
+            found.setdefault((f.recording, f.against), []).append(f.label)
+    return {place: first_of(labels, LISTED) for place, labels in found.items()}
+
+
 def _advice(
     word: Verdict,
     findings: Sequence[SetFinding],
@@ -271,13 +281,16 @@ def _advice(
 ) -> tuple[Advice, ...]:
     out = [*steps, *sites_to_check(findings)]
     closed = {members[0] for members, _ in closing}
-    for f in findings:
-        if f.against:
-            out.append(Advice(Kind.RECORD_A_THIRD, (f.label, f.against, f.recording)))
-        elif f.recording:
-            out.append(Advice(Kind.LOOK_AT_RECORDING, (f.recording, f.label)))
-        elif f.alike and f.label not in closed:
-            out.append(Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0])))
+    for (recording, against), labels in _of_recordings(findings).items():
+        if against:
+            out.append(Advice(Kind.RECORD_A_THIRD, (labels, against, recording)))
+        else:
+            out.append(Advice(Kind.LOOK_AT_RECORDING, (recording, labels)))
+    out += [
+        Advice(Kind.NO_PLAN_TELLS, (f.label, f.alike[0]))
+        for f in findings
+        if not f.recording and f.alike and f.label not in closed
+    ]
     for (label, *others), turn in closing:
         if turn.after < _TELLS:
             out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, _TELLS), Verb.CONTINUE))

@@ -22,6 +22,7 @@ from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.results import (
     START_TEMPERATURE,
@@ -29,6 +30,7 @@ from sdimu_calibration.core.results import (
     PowerOnDeviation,
     SetRecording,
     SetSummary,
+    SetTrend,
     TurnOn,
     no_history,
 )
@@ -38,6 +40,8 @@ from sdimu_calibration.core.wording import Work
 
 _LISTED = 4
 """Number of recordings that a line names: the table of the page has all."""
+MANY = 3
+"""Number of coefficients that differ above which one line tells of all: physics seldom moves so many."""
 SCATTERS = 1e-3
 """Probability (1) below which a coefficient is told to differ from recording to recording: one set in a thousand does
 so by chance."""
@@ -154,7 +158,7 @@ def _origin(fit: SetFit, base: Fit) -> Origin:
 
 
 def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
-    of_one = [f"in {name} alone: {key}" for name, keys in fit.local.items() for key in keys]
+    of_one = [f"in {name} alone: {', '.join(keys)}" for name, keys in fit.local.items() if keys]
     scatter = [_scatter(t) for t in with_units(fit, base)]
     files = sorted({r.imu.name for r in fit.reports})
     mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
@@ -204,17 +208,34 @@ def _warnings(fit: SetFit, varied: Variation, names: Sequence[str]) -> tuple[str
         if name in names and p * len(names) < SCATTERS
     ]
     trends = {t.name: t for t in varied.trends if t.p_value < SCATTERS}
-    lines = [
-        Note(
-            f"{name} is not the same in all recordings (p {p:.1g})"
-            + (f"; it follows {trends[name].covariate}" if name in trends else ""),
-            Topic.DIFFERS,
-            f"; run: {Work.DIAGNOSE}",
-        )
-        for p, name in sorted(odd)
-    ]
+    lines = [_differing(name, p, trends.get(name)) for p, name in sorted(odd)]
+    if len(odd) > MANY:
+        lines = [_many_differ(fit, [name for _, name in sorted(odd)], len(names), sorted(odd)[0][0])]
     left_out = [f"{name} is left out: {why}" for name, why in fit.left_out]
     return (*left_out, *_misfit(fit), *lines, *_told(fit, [r.warnings for r in fit.reports]))
+
+
+def _differing(name: str, p: float, trend: SetTrend | None) -> Note:
+    """Say that a coefficient differs between recordings by more than chance, and what it follows."""
+    follows = f"; it follows {trend.covariate}" if trend else ""
+    chance = f"p {p:.1g}" if p > 0.0 else "p < 1e-300"
+    return Note(
+        f"{name} is not the same in all recordings ({chance}){follows}", Topic.DIFFERS, f"; run: {Work.DIAGNOSE}"
+    )
+
+
+def _many_differ(fit: SetFit, odd: Sequence[str], count: int, p: float) -> Note:
+    """Say it of many coefficients at once: so many seldom differ by physics."""
+    chance = f"p {p:.1g}" if p > 0.0 else "p < 1e-300"
+    whose = "or not of one unit" if fit.unit_doubt else "or changed between the recordings"
+    most = first_of(odd, _LISTED)
+    return Note(
+        f"{len(odd)} of {count} coefficients are not the same in all recordings ({chance}; most: {most}): their axes "
+        f"or units are read otherwise, {whose}; calibrate each recording by itself, and compare the results with "
+        f"{Work.FLEET}",
+        Topic.DIFFERS,
+        f"; run: {Work.DIAGNOSE}",
+    )
 
 
 def _beyond(fit: SetFit, base: Fit) -> list[str]:

@@ -18,9 +18,10 @@ from sdimu_calibration.core.joint.recurrence_words import answer_in_words
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit
-from sdimu_calibration.core.joint.set_result import SCATTERS, worst_figure
+from sdimu_calibration.core.joint.set_result import MANY, SCATTERS, worst_figure
 from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
@@ -141,6 +142,9 @@ def _found(word: Verdict, facts: SetFacts) -> str:
     if word in {Verdict.DATA_FAULT, Verdict.UNEXPLAINED}:
         names = " and ".join(map(_named, findings[:LISTED]))
         names += f" and {len(findings) - LISTED} more" if len(findings) > LISTED else ""
+        changed = [f for f in findings if f.against or is_change(f.label)]
+        if word == Verdict.DATA_FAULT and len(changed) > MANY:
+            return _many_changed(changed)
         if word == Verdict.DATA_FAULT:
             return f"All recordings agree but for {names}."
         most = f" Found, but not all: {names}." if names else ""
@@ -155,6 +159,17 @@ def _graded(f: SetFinding) -> Graded:
     # Of what is of one recording alone the class is not told: what happened there is to be found out.
     shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
     return Graded(_named(f), without_variant(f.label), size(f.value, f.sigma, f.display_unit), f.probability, shares)
+
+
+def _many_changed(changed: Sequence[SetFinding]) -> str:
+    """Say that so many coefficients are others in some recordings that physics is not what changed them."""
+    which = dict.fromkeys(name for f in changed for name in (f.against, f.recording) if name)
+    most = first_of([f.label for f in changed], LISTED)
+    where = f"{' and '.join(which)} differ" if changed[0].against else f"in {' and '.join(which)}, the unit differs"
+    return (
+        f"Not one unit, or one that was changed, or axes or units that are read otherwise: {where} in {len(changed)} "
+        f"coefficients ({most})."
+    )
 
 
 def _named(f: SetFinding) -> str:

@@ -29,6 +29,9 @@ _SEEN = 0.02
 _RANK = 1e-6
 """Ratio of an eigenvalue to the largest from which it counts: below is rounding."""
 
+_FEWEST_VALUES = 3
+"""Number of different values of a covariate from which a coefficient can follow it: through two any line leads."""
+
 
 @dataclass(frozen=True)
 class Variation:
@@ -130,7 +133,7 @@ def covariates(reports: Sequence[Report]) -> Mapping[str, Floats]:
         "date (d)": days - days.min(),
         "order": order,
     }
-    return {name: x for name, x in all_of.items() if np.isfinite(x).all() and np.ptp(x) > 0.0}
+    return {name: x for name, x in all_of.items() if np.isfinite(x).all() and len(np.unique(x)) >= _FEWEST_VALUES}
 
 
 def _trends(fit: SetFit, names: Sequence[str], scores: _Scores) -> tuple[SetTrend, ...]:

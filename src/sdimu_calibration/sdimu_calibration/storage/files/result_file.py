@@ -343,7 +343,7 @@ def as_note(line: str) -> str:
     if found is None:
         topics = (topic for words, topic in _TOPICS.items() if words in line)
         return Note(line, topic) if (topic := next(topics, None)) else line
-    topic = Topic.DIFFERS if "is not the same in all recordings" in line else Topic.MISFIT
+    topic = Topic.DIFFERS if "not the same in all recordings" in line else Topic.MISFIT
     # A note on noise says that the model fits.
     return Note(found[1], None if found[2].startswith(":") else topic, found[2])
 
