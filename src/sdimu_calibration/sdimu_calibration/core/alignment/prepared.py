@@ -14,6 +14,7 @@ from sdimu_calibration.core.data.dwell_detection import specification_is_wide
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import Bridges, bridges, judge, largest_acceleration, stepped, weighed
 from sdimu_calibration.core.data.long_epochs import long_epochs
+from sdimu_calibration.core.data.moved_in_rest import without_tilts
 from sdimu_calibration.core.data.phases import (
     Phases,
     PhaseState,
@@ -176,6 +177,7 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     limits, vibrating = with_vibration(cycles, epochs, recording.phase, setup.limits, setup.gravity, density)
     phases = classify(epochs, recording.phase, limits, setup.gravity, setup.model.settle_s, PhaseState())
     phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
+    phases, tilted = without_tilts(epochs, recording.phase, phases, setup.imu)
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
     found, steps = stepped(found, cycles, epochs, phases.dwell, recording.clock_steps, setup.gravity)
@@ -189,6 +191,7 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
         *unsound,
         *lost,
         *vibrating,
+        *tilted,
         *contradictions(epochs, phases, recording.phase, not specification_is_wide(setup.imu)),
     )
     if len(epochs) > MOST_EPOCHS:
