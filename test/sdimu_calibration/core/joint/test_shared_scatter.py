@@ -94,4 +94,6 @@ def test_a_part_that_scatters_otherwise_keeps_its_own():
     quiet, also, wild = fit.reports
     np.testing.assert_array_equal(quiet.scatter, also.scatter)
     assert wild.scatter is None
+    told = [note for note in set_outcome(fit).notes if "beyond white noise" in note]
+    assert [note.split(":")[0] for note in told] == ["part 0, part 1", "part 2"]
     assert quiet.scatter[FORCE] < ALIKE < wild.by_hand.extra[FORCE]

@@ -24,7 +24,7 @@ from sdimu_calibration.core.handheld.handheld_data import HandheldRun, reduce_ru
 from sdimu_calibration.core.handheld.handheld_faults import without_impossible
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, HandheldSolution
 from sdimu_calibration.core.handheld.rest_choice import FEWEST_RESTS, ChosenRests, choose_rests
-from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
+from sdimu_calibration.core.handheld.run_scatter import scatter_in_words
 from sdimu_calibration.core.handheld.whole_turns import whole_turns, with_whole_turns
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError, DataFault, Recording
@@ -108,8 +108,8 @@ def handheld_notes(run: HandheldRun, scene: FitPriors, found: HandheldSolution, 
     out = [
         f"handheld: {len(run.t)} rests of {run.seconds.min():.1f} to {run.seconds.max():.1f} s; white noise at rest "
         f"{from_si(scene.gyro_white_noise, 'deg/h'):.3g} deg/h/sqrt(Hz), "
-        f"{from_si(scene.accel_white_noise, 'ug'):.3g} ug/sqrt(Hz); beyond it force {from_si(extra[FORCE], 'ug'):.3g} "
-        f"ug, rate {np.degrees(extra[RATE]):.2g} deg/s, turns {100.0 * extra[TURN]:.2g} % of the angle",
+        f"{from_si(scene.accel_white_noise, 'ug'):.3g} ug/sqrt(Hz); beyond it "
+        f"{scatter_in_words(extra.tolist())}",
         _gravity_note(scene, site),
         _earth_note(found, site),
     ]

@@ -15,6 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
+from sdimu_calibration.core.units import from_si
 
 FORCE, RATE, TURN, WHOLE, PRIOR = 0, 1, 2, 3, -1
 """The kinds of equation; the scatter of the first three is learned, that of whole turns is stated, priors are whitened
@@ -169,6 +170,13 @@ def learned(scatter: RunScatter, extra: Floats, left: Floats, free: Floats) -> F
 
         out[which] = _root(excess, float(np.sqrt(np.mean(squares))))
     return out
+
+
+def scatter_in_words(extra: Sequence[float]) -> str:
+    """Write learned sigmas of force (m/s^2), rate (rad/s) and turn (share of the angle) for people."""
+    force, rate, turn = (extra[which] for which in (FORCE, RATE, TURN))
+    share = 100.0 * turn
+    return f"force {from_si(force, 'ug'):.3g} ug, rate {np.degrees(rate):.2g} deg/s, turns {share:.2g} % of the angle"
 
 
 def _root(excess: Callable[[float], float], scale: float) -> float:

@@ -14,6 +14,7 @@ from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationF
 from sdimu_calibration.core.estimation.outcome import doubted, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
+from sdimu_calibration.core.handheld.run_scatter import scatter_in_words
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
@@ -163,7 +164,18 @@ def _notes(fit: SetFit, base: Fit) -> tuple[str, ...]:
     files = sorted({r.imu.name for r in fit.reports})
     mixed = [f"the recordings state different IMUs ({', '.join(files)}): a set is of one unit"] if files[1:] else []
     doubt = [fit.unit_doubt] if fit.unit_doubt else []
-    return (*mixed, *doubt, *of_one, *_beside(fit), *scatter, *_told(fit, [r.notes for r in fit.reports]))
+    by_hand = _scatter_by_hand(fit)
+    return (*mixed, *doubt, *of_one, *_beside(fit), *scatter, *by_hand, *_told(fit, [r.notes for r in fit.reports]))
+
+
+def _scatter_by_hand(fit: SetFit) -> list[str]:
+    """Say by what runs by hand scatter beyond white noise, and which of them have a scatter of their own."""
+    told: dict[tuple[float, ...], list[str]] = {}
+    for k in fit.shown:
+        report = fit.reports[k]
+        if report.by_hand is not None:
+            told.setdefault(tuple(report.by_hand.extra.tolist()), []).append(report.name)
+    return [f"{', '.join(names)}: beyond white noise {scatter_in_words(extra)}" for extra, names in told.items()]
 
 
 def _beside(fit: SetFit) -> list[str]:
