@@ -82,6 +82,7 @@ LONG = {
         "test_diagnose_ends_as_its_verdict_says[1-one effect]",
         "test_diagnose_ends_as_its_verdict_says[2-one effect]",
         "test_diagnose_ends_as_its_verdict_says[2-unexplained]",
+        "test_a_search_that_does_not_settle_ends_with_3[2]",
     ),
     "test/sdimu_calibration/cli/test_noise.py": ("test_pulses_and_wandering_bias_go_into_the_file",),
     "test/sdimu_calibration/cli/test_plan.py": ("test_what_only_a_change_of_temperature_tells_is_said_so",),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,13 @@ from sdimu_calibration.cli.compensate import compensate
 from sdimu_calibration.cli.export import export
 from sdimu_calibration.cli.opened import leave
 from sdimu_calibration.core.diagnosis import diagnose as of_one
+from sdimu_calibration.core.diagnosis import rounds
+from sdimu_calibration.core.diagnosis.screen import screen
+from sdimu_calibration.core.diagnosis.verdict import Facts, verdict
+from sdimu_calibration.core.estimation.noise_estimate import not_of_sensors
 from sdimu_calibration.core.joint import set_diagnosis as of_set
+from sdimu_calibration.core.joint import set_search
+from sdimu_calibration.core.noise_term import RANDOM_WALK, SHIFT, NoiseTerm, unexplained
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.verdict import Verdict
@@ -205,3 +212,35 @@ def test_diagnose_ends_as_its_verdict_says(sdimu, bags, monkeypatch, number, ver
     status, _, err = sdimu("diagnose", *bags[:number])
     assert status == (3 if verdict == "unexplained" else 0)
     assert (f"not to be trusted: {verdict}: " in err) == (status == 3)
+
+
+@pytest.mark.parametrize("kind", ["stuck", "saturated", "spike"])
+@pytest.mark.parametrize("grave", [True, False])
+def test_both_verbs_judge_a_fault_of_the_data_alike(capsys, kind, grave):
+    fault = DataFault(kind, "wrong samples", 3, 1.0, 1.1, grave)
+    fit = SimpleNamespace(faults=(fault,), test=SimpleNamespace(recording=SimpleNamespace(rejected=0)))
+    (finding,) = screen(fit)
+    word = verdict(Facts(grave=finding.grave))
+    result = replace(FITS, faults=(fault,))
+    of_calibration = left(capsys, result)[0]
+    of_diagnosis = left(capsys, result, (word, "The data have a fault: wrong samples."))[0]
+    assert of_calibration == of_diagnosis == (3 if grave else 0)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_search_that_does_not_settle_ends_with_3(sdimu, bags, monkeypatch, number):
+    monkeypatch.setattr(rounds, "MOST_ROUNDS", 1)
+    monkeypatch.setattr(set_search, "_MOST_ROUNDS", 1)
+    status, _, err = sdimu("diagnose", *bags[:number])
+    assert status == 3
+    assert "went to and fro" in err
+
+
+def test_noise_that_no_sensor_has_is_a_misfit_of_a_calibration_as_of_a_diagnosis():
+    drawn, walk = NoiseTerm("accel", SHIFT), NoiseTerm("gyro", RANDOM_WALK)
+    like_a_walk = replace(drawn, alike=(RANDOM_WALK,))
+    assert unexplained([drawn, walk, like_a_walk]) == (drawn,)
+    assert unexplained([drawn], ["gap", "spike"]) == ()
+    note = not_of_sensors([drawn])
+    assert replace(FITS, warnings=(note,)).misfits == (note,)
+    assert as_note(str(note)).topic == note.topic

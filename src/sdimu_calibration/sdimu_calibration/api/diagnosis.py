@@ -20,6 +20,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import NavigationEviden
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
+from sdimu_calibration.report.cost import held_to_use
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
@@ -110,16 +111,13 @@ class FitDiagnosis(Diagnosed):
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
         folder = results_folder(folder)
+        more = report_extras(self.core, self._delivered)
+        told = held_to_use(self.core, more)
         with written_together(folder) as part:
-            write_diagnosis(part / "diagnosis.json", self.summary)
-            write_result(part / "result.json", self.core.after, self.core.verdict)
+            write_diagnosis(part / "diagnosis.json", summarise(told))
+            write_result(part / "result.json", told.after, told.verdict)
             write_report(
-                part / "report.html",
-                self.core.after,
-                title="Diagnosis",
-                summary=self.summary,
-                more=report_extras(self.core, self._delivered),
-                trace=traced(),
+                part / "report.html", told.after, title="Diagnosis", summary=summarise(told), more=more, trace=traced()
             )
         return folder
 

@@ -59,6 +59,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.report.cost import held_to_use
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.storage.files.effect_file import find_effects
     from sdimu_calibration.storage.files.model_choice import HANDHELD
@@ -89,6 +90,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         found = climb(fit, extra, progress, refits=request.grow)
         progress("navigation without aid", 0.97)
         more = report_extras(found, fit)
+    found = held_to_use(found, more)
     summary = summarise(found)
     about = replace(Asked.of((bag,), folder, opening, request), has_plan=as_plan(summary.plan) is not None)
     print_summary(console, summary, about, more)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -114,6 +114,22 @@ def may_be_an_effect(terms: Sequence[NoiseTerm]) -> bool:
     long as a stop takes the sensitivity of a gyro to force. Bias instability and random walk are in data sheets.
     """
     return any(term.kind not in {FLICKER, RANDOM_WALK} for term in terms)
+
+
+def unexplained(terms: Sequence[NoiseTerm], fault_kinds: Iterable[str] = ()) -> tuple[NoiseTerm, ...]:
+    """Return the terms that no sensor has by itself: a cause that the model lacks is behind them.
+
+    A calibration and a diagnosis judge the noise of their model by this alone. Wrong samples in turns leave noise that
+    looks drawn anew in each turn, so that where single samples were wrong nothing follows.
+
+    Parameters
+    ----------
+    terms : sequence of NoiseTerm
+        That were learned beside the model.
+    fault_kinds : iterable of str
+        Kinds of the faults of the recording, as in `DataFault`.
+    """
+    return () if "spike" in fault_kinds else tuple(term for term in terms if term.is_drawn)
 
 
 def sensors_of(triad: str, axes: tuple[int, ...]) -> str:

@@ -51,7 +51,8 @@ class DataFault:
     end_s: float = float("nan")
     """`start_s`, `end_s`: first and last time (s); NaN where that has no meaning."""
     grave: bool = False
-    """The estimate is not to be trusted until someone has looked at it."""
+    """The estimate is not to be trusted until someone has looked at it: wrong samples are in it, or may be. Every verb
+    judges a fault by this alone; samples that were taken as missing are not in the fit and make no fault grave."""
 
 
 @dataclass(frozen=True)

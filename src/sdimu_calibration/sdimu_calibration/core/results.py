@@ -242,6 +242,11 @@ class Calibration:
         grave = [fault.text for fault in self.faults if fault.grave]
         return tuple(dict.fromkeys([*grave, *self._about(Topic.NOT_TRUSTED)]))
 
+    def warned(self, *lines: str) -> Calibration:
+        """Return the result with more warnings, which are notes as well; one that it has is not said twice."""
+        new = tuple(line for line in lines if line not in self.warnings)
+        return replace(self, notes=(*self.notes, *new), warnings=(*self.warnings, *new))
+
     @property
     def misfits(self) -> tuple[str, ...]:
         """Where the model does not fit the data, one line each: those of the warnings that send to a diagnosis."""

@@ -10,6 +10,7 @@ from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.specification import Model
+from sdimu_calibration.report.cost import held_to_use
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
@@ -29,7 +30,8 @@ def leave_report(folder: Path, test: PreparedTest, model: Model, name: str) -> N
     diagnosed.
     """
     found = climb(solve(test, model))
-    summary, more = summarise(found), report_extras(found)
+    more = report_extras(found)
+    summary = summarise(held_to_use(found, more))
     result = outcome(found.fit, refuse=False)
     with written_together(folder) as part:
         write_diagnosis(part / DIAGNOSIS, summary)

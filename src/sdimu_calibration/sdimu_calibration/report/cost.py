@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import decimals
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.diagnosis.verdict import sentence
 from sdimu_calibration.core.estimation.free_inertial import NOTHING
-from sdimu_calibration.core.results import Calibration
+from sdimu_calibration.core.note import Note, Topic
+from sdimu_calibration.core.results import NOT_TRUSTED, Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.report_extras import ReportExtras
 
 _KILOMETRE = 1000.0
 _CHANCE = 3.0
 """Error of position over its predicted sigma (1) from which it is no chance, of one stretch or two."""
+_NOT_HELD = "what was found does not hold where it was not fitted"
+"""What is said where a navigation without aid contradicts what was found."""
 _WHOLE_M = 10.0
 """Distance (m) from which metres have no decimals: a tenth of less is still seen."""
 
@@ -126,8 +131,38 @@ class InUse:
         if not np.isfinite(self.promised):
             return ""
         told = f"; the last fit predicted {metres(self.promised)}"
-        fails = len(self.distance) > 2 and self.distance[-1] > max(self.distance[-2], _CHANCE * self.promised)
-        return f"{told}: what was found does not hold where it was not fitted" if fails else told
+        return f"{told}: {_NOT_HELD}" if self.fails else told
+
+    @property
+    def fails(self) -> bool:
+        """Whether the navigation contradicts what was found: worse with it than without, and than chance allows."""
+        if not np.isfinite(self.promised) or len(self.distance) < 3:
+            return False
+        return self.distance[-1] > max(self.distance[-2], _CHANCE * self.promised)
+
+
+def held_to_use(d: Diagnosis, more: ReportExtras | None) -> Diagnosis:
+    """Judge a diagnosis by a navigation without aid: what fails there is not told as certain, nor to be trusted.
+
+    Parameters
+    ----------
+    more : ReportExtras or None
+        With the navigations; without any the diagnosis is returned as it is.
+
+    Returns
+    -------
+    Diagnosis
+        The same object where nothing contradicts it.
+    """
+    use = in_use(more)
+    if use is None or not use.fails:
+        return d
+    told = (
+        f"{_NOT_HELD}: after {use.minutes:.0f} min without aid the position is {metres(use.distance[-1])} off, "
+        f"{metres(use.distance[-2])} without it, {metres(use.promised)} as predicted: the estimate is {NOT_TRUSTED}"
+    )
+    after = d.after.warned(Note(told, Topic.NOT_TRUSTED))
+    return replace(d, sentence=sentence(d, d.found_effects, held=False), after=after)
 
 
 def in_use(more: ReportExtras | None) -> InUse | None:

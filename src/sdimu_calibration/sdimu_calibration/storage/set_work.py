@@ -58,8 +58,7 @@ def judged_outcome(fit: SetFit) -> Calibration:
         f"the model does not fit: the recordings do not predict each other (held-out error {error:.3f}; 1 is right): "
         "physics is missing, or they are not of one unit in one state"
     )
-    note = Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")
-    return replace(result, notes=(*result.notes, note), warnings=(*result.warnings, note))
+    return result.warned(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.report import first_screen
+from sdimu_calibration.report import cost, first_screen
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +70,22 @@ def test_an_equation_that_fits_is_not_called_certain_physics(summary):
     begun = "No effect of the catalogue fits, an equation does. Missing for certain, and fitted by: accelerometer"
     assert sentence(d, told.found).startswith(begun)
     assert sentence(replace(d, own=False, verdict=Verdict.ONE_EFFECT), told.found).startswith("Certain: accelerometer")
+
+
+def test_what_fails_where_it_was_not_fitted_is_not_called_certain_nor_to_be_trusted(summary, monkeypatch):
+    """In a recording metres without aid grew from 40 to 105 m beside "Certain: ..."."""
+    told = with_shares(summary, 0.999, (own(summary), 0.999))
+    d = replace(told.diagnosis, found_effects=told.found, verdict=Verdict.ONE_EFFECT)
+    names = ("not compensated", "model as given", "with what was found")
+    ends = iter((30.0, 105.0))
+    monkeypatch.setattr(cost, "in_use", lambda _: cost.InUse(10.0, 2, names, (2500.0, 40.0, next(ends)), 27.0))
+    assert cost.held_to_use(d, None) is d
+    judged = cost.held_to_use(d, None)
+    assert judged.sentence.startswith("In what was fitted, but not beyond it: accelerometer")
+    assert "Certain" not in judged.sentence
+    assert judged.after.not_to_be_trusted[-1].startswith(
+        "what was found does not hold where it was not fitted: after 10"
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.data.gaps import step_fault, told_together
-from sdimu_calibration.core.estimation.outcome import calibrate
+from sdimu_calibration.core.diagnosis.screen import screen
+from sdimu_calibration.core.estimation.outcome import calibrate, outcome
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import ClockStep
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.files.effect_file import extended_model
@@ -36,13 +39,40 @@ def test_a_sound_run_has_no_fault(sound):
     assert sound.faults == ()
 
 
-def test_clipped_gyros_are_named_and_do_not_pass_for_a_good_fit(run, sound):
-    limit = 0.5 * np.abs(run.omega_ib_b).max()
-    clipped = replace(run, omega_ib_b=np.clip(run.omega_ib_b, -limit, limit))
-    found = calibrate(clipped, None, MEMS, MODEL, estimator="handheld")
-    assert "saturated" in {fault.kind for fault in found.faults}
-    assert any("not to be trusted" in warning for warning in found.warnings)
-    assert moved(found, sound) < 5.0
+def clipped_at(run, share):
+    limit = share * np.abs(run.omega_ib_b).max()
+    return replace(run, omega_ib_b=np.clip(run.omega_ib_b, -limit, limit))
+
+
+@pytest.mark.parametrize("share", [0.8, 0.9])
+def test_turns_with_clipped_gyros_say_nothing_and_the_rest_is_as_it_was(run, sound, share):
+    """Their angle is too small: a scale factor went with it."""
+    found = calibrate(clipped_at(run, share), None, MEMS, MODEL, estimator="handheld")
+    told = [fault for fault in found.faults if fault.kind == "saturated"]
+    assert told
+    assert all("the turns there say nothing" in fault.text for fault in told)
+    assert moved(found, sound) < 2.0
+    assert found.not_to_be_trusted == ()
+
+
+def test_a_reading_at_the_end_of_its_range_at_rest_is_grave_whoever_asks(run):
+    """Calibrate ended with 0 where diagnose of the same bag ended with 3: one rule judges a fault."""
+    fit = solve(PreparedTest(run, MEMS, None), MODEL, "handheld")
+    rest = fit.test.run.rests
+    middle = int((rest.first[3] + rest.last[3]) // 2)
+    force = run.f_ib_b.copy()
+    force[middle : middle + 4, 1] = force[:, 1].max() + 1.0
+    spoilt = solve(PreparedTest(replace(run, f_ib_b=force), MEMS, None), MODEL, "handheld")
+    (fault,) = [fault for fault in spoilt.faults if fault.kind == "saturated"]
+    assert fault.grave
+    assert "--exclude-times" in fault.text
+    assert [finding.grave for finding in screen(spoilt) if finding.kind == "saturated"] == [True]
+    assert fault.text in outcome(spoilt).not_to_be_trusted
+    begin, end = fault.start_s - 0.1, fault.end_s + 0.1
+    mended = solve(
+        PreparedTest(replace(run, f_ib_b=force), MEMS, None).without_times(((begin, end),)), MODEL, "handheld"
+    )
+    assert not any(fault.grave for fault in mended.faults)
 
 
 def test_missing_samples_are_told(run):

@@ -13,6 +13,7 @@ from sdimu_calibration.core.error_figures import degrees_of_freedom, held_out_ju
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.noise_term import unexplained
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 
@@ -67,14 +68,12 @@ def alarms(
     # Neighbouring epochs say what the noise is, but for a sensor that counts pulses.
     judged = not (base.learns_scatter or noise or stated.epoch_s > EPOCH_S)
     excess = misfit(after, consistency, stated, base.test.imu) if judged else 0.0
-    # Wrong samples in turns leave noise that looks drawn anew in each turn.
-    spoilt = any(finding.kind == "spike" for finding in findings)
     rings = {
         Alarm.FREE_INPUTS: done.left_after.p_value < UNEXPLAINED_P,
         # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
         Alarm.HELD_OUT: not base.learns_scatter and held_out_judged(after) > STILL_WRONG,
         Alarm.NIS: excess > largest_misfit(float(np.fmax(degrees_of_freedom(after), 1.0))),
-        Alarm.DRAWN: not spoilt and any(term.is_drawn for term in noise),
+        Alarm.DRAWN: bool(unexplained(noise, [finding.kind for finding in findings])),
         Alarm.PATCHWORK: patchwork(done.chosen),
     }
     return frozenset(alarm for alarm, rung in rings.items() if rung)

@@ -198,6 +198,7 @@ def climb(
     # A missing effect that is found may be so large that without it there is no fit at all.
     before = outcome(as_given, refuse=not done.chosen)
     after = doubted(outcome(done.fit) if done.chosen else before, widened.values, widened.covariance)
+    after = after if done.found.stood else after.warned(TO_AND_FRO)
     own = any(c.family == "own" for c in done.chosen)
     raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))

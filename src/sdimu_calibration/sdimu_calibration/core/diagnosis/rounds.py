@@ -28,13 +28,17 @@ from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
 from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.progress import Progress
+from sdimu_calibration.core.results import NOT_TRUSTED
 
-TO_AND_FRO = (
-    "the search for missing effects went to and fro between choices that explain about the same, and was ended: of "
-    "these one is named, and another may be right"
+TO_AND_FRO = Note(
+    "the search for missing effects went to and fro between choices that explain about the same, and was ended: one "
+    f"of them is named, another may be right, and the estimate is {NOT_TRUSTED}",
+    Topic.NOT_TRUSTED,
 )
-"""Finding where the search did not come to an end by itself."""
+"""Finding, and warning of the result, where the search did not come to an end by itself: the coefficients depend on
+which choice was the last."""
 UNEXPLAINED_P = 1e-3
 """Probability of the free-input test below which what is left is not noise: one sound test in a thousand is there."""
 MOST_ROUNDS = 4

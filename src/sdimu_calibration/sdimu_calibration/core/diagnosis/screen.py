@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from sdimu_calibration.core.estimation.fit import Fit
 
-_MISLEADING = frozenset({"stuck", "saturated"})
-"""Faults of a sensor that its other samples may share to a lesser degree, so that an effect can pass for them."""
-
 
 @dataclass(frozen=True)
 class Finding:
@@ -27,10 +24,7 @@ class Finding:
 
 def screen(fit: Fit) -> tuple[Finding, ...]:
     """Say what is wrong with the data."""
-    out = [
-        Finding(fault.text, fault.grave or fault.kind in _MISLEADING, fault.kind, fault.start_s, fault.end_s)
-        for fault in fit.faults
-    ]
+    out = [Finding(fault.text, fault.grave, fault.kind, fault.start_s, fault.end_s) for fault in fit.faults]
     rejected = fit.test.recording.rejected
     if rejected:
         out.append(Finding(f"{rejected} samples were rejected (not finite or repeated stamps)", False))

@@ -34,6 +34,9 @@ _ROUNDING = 1e-6
 _EQUATION = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 
+_FITTED = "In what was fitted, but not beyond it"
+"""What is said in the place of ``Certain`` where what was found fails on data that no fit has seen."""
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -76,13 +79,15 @@ def verdict(facts: Facts) -> Verdict:
     return Verdict.NOISE_MODEL_WRONG if facts.noise else Verdict.CONSISTENT
 
 
-def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
+def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
     """Put the verdict into one sentence: what was found by how sure it is.
 
     Parameters
     ----------
     found : sequence of Found
         What was chosen, one at a time.
+    held : bool
+        Whether it holds where it was not fitted; False: nothing of it is called certain.
     """
     names = listed(c.label for c in d.chosen)
     if d.verdict == Verdict.CONSISTENT:
@@ -98,9 +103,10 @@ def sentence(d: Diagnosis, found: Sequence[Found]) -> str:
     if not d.chosen and d.probabilities is not None:
         return something_missing(d.probabilities)
     every = _graded(d, [one for one in found if not _is_fault(one)])
+    firm = (_EQUATION if d.own else "Certain") if held else _FITTED
     # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    own = f"No effect of the catalogue fits, an equation does. {in_grades(every, _EQUATION)}"
-    return f"{own if d.own else in_grades(every)} {_of_recording(d, found)}".strip()
+    own = f"No effect of the catalogue fits, an equation does. {in_grades(every, firm)}"
+    return f"{own if d.own else in_grades(every, firm)} {_of_recording(d, found)}".strip()
 
 
 def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:

@@ -18,7 +18,7 @@ from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
 from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
-from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
+from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.estimation.same_data import checksum, conditions
 from sdimu_calibration.core.estimation.site_rows import at_site, with_found
@@ -35,7 +35,7 @@ from sdimu_calibration.core.filter.filter_pass import PassOutput
 from sdimu_calibration.core.filter.passes import Pass, Solution
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
-from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect
+from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect, unexplained
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault
@@ -428,6 +428,8 @@ class NavigationFit(Fit):
             told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
             told += self._noise_in_words(nis)
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
+        elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults]):
+            out.append(not_of_sensors(odd))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
         return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import WORDS, NoiseTerm
-from sdimu_calibration.core.note import Note
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.wording import Work
 
@@ -43,3 +44,21 @@ def term_in_words(term: NoiseTerm) -> str:
     size, low, high = (f"{from_si(v, term.display_unit):.3g}" for v in (term.size, term.low, term.high))
     others = f" (or what looks the same: {', '.join(WORDS[kind] for kind in term.alike)})" if term.alike else ""
     return f"{term.words} {size} ({low} to {high}) {term.display_unit}{others}"
+
+
+def not_of_sensors(terms: Sequence[NoiseTerm], recording: str = "") -> Note:
+    """Say that the noise of a model is none of a sensor.
+
+    Parameters
+    ----------
+    terms : sequence of NoiseTerm
+        As `noise_term.unexplained` returns them.
+    recording : str
+        Whose noise it is, where there are several.
+    """
+    where = f" of {recording}" if recording else ""
+    told = (
+        f"the model does not fit{where}: it leaves {' and '.join(term.words for term in terms)}, which is no noise "
+        "of a sensor: a cause that depends on attitude or rate is missing, or a bias does so"
+    )
+    return Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")

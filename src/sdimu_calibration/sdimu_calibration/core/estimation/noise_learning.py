@@ -18,7 +18,7 @@ from sdimu_calibration.core.evidence.consistency import stop_means
 from sdimu_calibration.core.evidence.held_out import predict
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Modes, Wander, learn, likelihood
+from sdimu_calibration.core.evidence.learned_noise import Modes, Wander, learn, likelihood, with_alike
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.probability import chi2_tail
@@ -64,10 +64,9 @@ def noise_of(fit: Fit) -> FoundNoise:
         return FoundNoise()
     wander = fit.wander
     evidence = fit.bare.in_inner(wander.inner)
-    terms = wander.learned
-    if terms is None:
-        terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
-    return FoundNoise(terms, evidence)
+    information = Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight)
+    terms = learn(information, wander.cut) if wander.learned is None else wander.learned
+    return FoundNoise(with_alike(information, wander.cut, terms), evidence)
 
 
 def suspected(fit: NavigationFit) -> bool:

@@ -20,6 +20,7 @@ from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.data.trembling_rests import Sway, sway
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import NO_PAST, Motion
+from sdimu_calibration.core.handheld.range_end import at_range_end
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
@@ -28,6 +29,8 @@ from sdimu_calibration.core.recording import Recording, TemperatureLog
 
 _UNSEEN_S = 0.25
 """Length of a gap (s) in a turn from which a hand may have done anything in it: it turns by 20 deg in that time."""
+_EPS_S = 1e-9
+"""Difference of two times (s) that are one: rounding of sums of intervals is below it."""
 _ANY_TURN = 10.0
 """Sigma of the angle of such a turn (rad): more than an angle can be, so that its equation has no weight."""
 
@@ -73,9 +76,8 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     nominal = nominal_interval(recording.t)
     cycles = Reducer(nominal).add(recording.t, recording.omega_ib_b, recording.f_ib_b)
     start = cycles.t - cycles.dt
-    eps = 1e-9
-    begin = np.searchsorted(start, recording.t[np.maximum(rests.first - 1, 0)] - eps)
-    end = np.searchsorted(cycles.t, recording.t[rests.last - 1] + eps, side="right")
+    begin = np.searchsorted(start, recording.t[np.maximum(rests.first - 1, 0)] - _EPS_S)
+    end = np.searchsorted(cycles.t, recording.t[rests.last - 1] + _EPS_S, side="right")
     # A rest shorter than its cuts leave keeps the one cycle in its middle.
     end = np.maximum(end, begin + 1)
     total = np.vstack([np.zeros(7), np.cumsum(np.hstack([cycles.dt[:, None], cycles.alpha, cycles.upsilon]), axis=0)])
@@ -87,6 +89,7 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     for step in recording.clock_steps:
         cycle, error = open_angle(step, cycles)
         gap[cycle] += _ANY_TURN**2 if step.size_s > _UNSEEN_S else error**2
+    gap[clipped_cycles(recording, cycles.t)] = _ANY_TURN**2
     return HandheldRun(
         0.5 * (start[begin] + cycles.t[end - 1]),
         part[:, 0],
@@ -100,6 +103,22 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
         recording.temperature,
         sway(recording, rests),
     )
+
+
+def clipped_cycles(recording: Recording, t: Floats) -> Ints:
+    """Cycles in which a gyro stands at the end of its range: how fast the IMU turned there is not known.
+
+    Parameters
+    ----------
+    t : ndarray, shape (n,)
+        End of each cycle (s), ascending.
+
+    Returns
+    -------
+    ndarray of int, shape (m,)
+    """
+    clipped = np.any(at_range_end(recording)[:, :3], axis=1)
+    return np.unique(np.minimum(np.searchsorted(t, recording.t[clipped] - _EPS_S), len(t) - 1))
 
 
 def _sums(values: Floats, first: Ints, last: Ints) -> Floats:

@@ -11,22 +11,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.gaps import open_angle, step_fault, told_together
 from sdimu_calibration.core.data.sample_screening import CHANNELS
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import HandheldSolution
+from sdimu_calibration.core.handheld.range_end import at_range_end
 from sdimu_calibration.core.handheld.run_scatter import FORCE, TURN
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.results import NOT_TRUSTED
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
+from sdimu_calibration.core.wording import Option
 
 _BEYOND = 10.0
 """Ratio to the 99th percentile from which a rate is impossible: a hand accelerates for longer than a sample."""
-_LEAST_IN_A_ROW = 3
-"""Least number of consecutive readings at the extreme number that is saturation: noise does not repeat its extreme."""
 _TURN_MISFIT = 0.01
 """Largest misfit of turns, a share of their angle: the Xsens recording has 0.0004."""
 _FORCE_MISFIT = 0.01 * STANDARD_GRAVITY
@@ -64,7 +64,7 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
 
 def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution) -> tuple[DataFault, ...]:
     """List missing samples, steps of the clock, readings at the end of the range, misfits that no sensor explains."""
-    return (*_missing(run), *_stepped(recording, run), *_clipped(recording), *_misfit(found))
+    return (*_missing(run), *_stepped(recording, run), *_clipped(recording, run), *_misfit(found))
 
 
 def _stepped(recording: Recording, run: HandheldRun) -> tuple[DataFault, ...]:
@@ -90,28 +90,42 @@ def _missing(run: HandheldRun) -> list[DataFault]:
     return [DataFault("gap", text, lost, float(t[0]), float(t[-1]))]
 
 
-def _clipped(recording: Recording) -> list[DataFault]:
-    """Find channels that stand at their largest or smallest number, several samples in a row."""
-    out = []
-    for name, x in zip(CHANNELS, (*recording.omega_ib_b.T, *recording.f_ib_b.T), strict=True):
-        if x.min() == x.max():
-            continue
-        rows = np.flatnonzero(_in_a_row(x == x.max()) | _in_a_row(x == x.min()))
-        if len(rows):
-            t = recording.t[rows]
-            text = f"{name} is at the end of its range in {counted(len(rows), 'sample')} ({t[0]:.1f} to {t[-1]:.1f} s)"
-            out.append(DataFault("saturated", text, len(rows), float(t[0]), float(t[-1])))
-    return out
+def _clipped(recording: Recording, run: HandheldRun) -> tuple[DataFault, ...]:
+    """Find channels that stand at the end of their range; grave where such readings are in the mean of a rest."""
+    clipped = at_range_end(recording)
+    at_rest = _at_rest(recording.t, run)
+    return tuple(
+        _clip(name, recording.t[bad], at_rest[bad], gyro=channel < 3)
+        for channel, (name, bad) in enumerate(zip(CHANNELS, clipped.T, strict=True))
+        if bad.any()
+    )
 
 
-def _in_a_row(flags: Bools) -> Bools:
-    """Keep runs of `_LEAST_IN_A_ROW` and more."""
-    edge = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    first, last = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
-    out = np.zeros(len(flags), dtype=bool)
-    for a, b in zip(first, last, strict=True):
-        out[a:b] = b - a >= _LEAST_IN_A_ROW
-    return out
+def _clip(name: str, t: Floats, at_rest: Bools, gyro: bool) -> DataFault:
+    """Say that a channel stands at the end of its range at times `t` (s), of which some are `at_rest`."""
+    text = f"{name} is at the end of its range in {counted(len(t), 'sample')} ({_span(t)})"
+    if at_rest.any():
+        where = f"{np.floor(t[at_rest][0] * 10.0) / 10.0:.1f}-{np.ceil(t[at_rest][-1] * 10.0) / 10.0:.1f}"
+        told = (
+            f"{text}, at rest: the mean of that rest is {NOT_TRUSTED}; leave that time out ({Option.EXCLUDE_TIMES} "
+            f"{where}), or give the sensor a wider range and record again"
+        )
+        return DataFault("saturated", Note(told, Topic.NOT_TRUSTED), len(t), float(t[0]), float(t[-1]), grave=True)
+    if gyro:
+        text += ": the turns there say nothing; turn the IMU more slowly, or give the sensor a wider range"
+    return DataFault("saturated", text, len(t), float(t[0]), float(t[-1]))
+
+
+def _span(t: Floats) -> str:
+    first, last = f"{t[0]:.1f}", f"{t[-1]:.1f}"
+    return f"{first} s" if first == last else f"{first} to {last} s"
+
+
+def _at_rest(t: Floats, run: HandheldRun) -> Bools:
+    """Say which of some times (s), shape (n,), are in the mean of a rest."""
+    begin = run.t - 0.5 * run.seconds
+    rest = np.searchsorted(begin, t, side="right") - 1
+    return np.asarray((rest >= 0) & (t <= begin[rest] + run.seconds[rest]))
 
 
 def _misfit(found: HandheldSolution) -> list[DataFault]:

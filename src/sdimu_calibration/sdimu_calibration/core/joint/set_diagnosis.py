@@ -131,7 +131,7 @@ def diagnose_set(
         f"{sentence(word, facts)} {why}".strip(),
         tuple(facts.findings),
         before,
-        facts.after,
+        facts.after if found.stood else facts.after.warned(TO_AND_FRO),
         found.threshold,
         (*kept, *_advice(word, facts.findings, next_recording(found.after, standing, test), steps)),
         standing,

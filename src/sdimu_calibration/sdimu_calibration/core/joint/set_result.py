@@ -11,6 +11,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.references import SITE_REFERENCES, told_of
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
+from sdimu_calibration.core.estimation.noise_estimate import not_of_sensors
 from sdimu_calibration.core.estimation.outcome import doubted, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
@@ -20,7 +21,7 @@ from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, power_on
 from sdimu_calibration.core.joint.variation import Variation, variation
-from sdimu_calibration.core.noise_term import may_be_an_effect
+from sdimu_calibration.core.noise_term import may_be_an_effect, unexplained
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
 from sdimu_calibration.core.plain_text import first_of
@@ -262,7 +263,8 @@ def _misfit(fit: SetFit) -> list[Note]:
     worst = {r.name: worst_figure(r) for r in fit.reports}
     bad = sorted((r for r in fit.reports if worst[r.name] > MISFIT), key=lambda r: -worst[r.name])
     if not bad:
-        return []
+        odd = [(r.name, unexplained(r.noise)) for r in fit.reports]
+        return [not_of_sensors(terms, name) for name, terms in odd if terms][:_LISTED]
     told = "; ".join(f"{r.name}: {_figures(r)}" for r in bad[:_LISTED]) + ("; others" if bad[_LISTED:] else "")
     return [
         Note(

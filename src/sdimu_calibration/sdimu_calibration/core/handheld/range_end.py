@@ -1,0 +1,39 @@
+"""Readings at the end of a sensor's range: what such a reading should have been, nobody knows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.recording import Recording
+
+_LEAST_IN_A_ROW = 3
+"""Least number of consecutive readings at the extreme number that is saturation: noise does not repeat its extreme."""
+
+
+def at_range_end(recording: Recording) -> Bools:
+    """Say which readings of each channel stand at its largest or smallest number, several in a row.
+
+    Returns
+    -------
+    ndarray of bool, shape (n, 6)
+        Three gyros, then three accelerometers. A channel that shows one number throughout has no end of a range.
+    """
+    columns = [_clipped(x) for triad in (recording.omega_ib_b, recording.f_ib_b) for x in triad.T]
+    return np.column_stack(columns)
+
+
+def _clipped(x: Floats) -> Bools:
+    if x.min() == x.max():
+        return np.zeros(len(x), dtype=bool)
+    return _in_a_row(x == x.max()) | _in_a_row(x == x.min())
+
+
+def _in_a_row(flags: Bools) -> Bools:
+    """Keep runs of `_LEAST_IN_A_ROW` and more."""
+    edge = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    first, last = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+    out = np.zeros(len(flags), dtype=bool)
+    for a, b in zip(first, last, strict=True):
+        out[a:b] = b - a >= _LEAST_IN_A_ROW
+    return out
