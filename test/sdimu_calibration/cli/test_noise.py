@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from sdimu_calibration.cli.noise import noise
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.noise import with_measured_noise
-from sdimu_calibration.core.units import to_si
+from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu
@@ -47,6 +48,25 @@ def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path,
     page = (tmp_path / "out" / "noise.html").read_text()
     assert "white noise" in page
     assert "plotly" in page
+
+
+def test_on_a_base_that_rocks_the_file_obeys_the_limits_that_are_printed(tmp_path: Path, capsys) -> None:
+    """A ring laser gyro on such a base was written with 33 deg/h/sqrt(Hz) beside limits of 6, 16 and 23."""
+    rng = np.random.default_rng(8)
+    n = round(300.0 / DT)
+    t = np.arange(1, n + 1) * DT
+    rate = GYRO / np.sqrt(DT) * rng.standard_normal((n, 3))
+    rate += to_si(60.0, "deg/h") * np.sin(2.0 * np.pi * np.outer(t, [0.25, 0.3, 0.35]))
+    force = ACCEL / np.sqrt(DT) * rng.standard_normal((n, 3)) + np.array([0.0, 0.0, -9.8])
+    stamps = np.arange(1, n + 1) * round(DT * 1e9)
+    write_recording(tmp_path / "rocks", BagContent(start_ns=10**18, imu_ns=stamps, omega_ib_b=rate, f_ib_b=force))
+    noise(tmp_path / "rocks", imu="dtg", out=tmp_path / "out")
+    told = capsys.readouterr().out
+    limits = [float(line.split("<")[1].split()[0]) for line in told.splitlines() if re.match(" gyro_. +white", line)]
+    found = from_si(load_imu(tmp_path / "out" / "imu.yaml").gyro_white_noise, "deg/h/sqrt(Hz)")
+    assert found <= 1.05 * np.sqrt(np.mean(np.square(limits)))
+    assert "what was taken for rest is none: the base rocks or vibrates (gyro_x, gyro_y, gyro_z)" in told
+    assert "is an upper limit" in (tmp_path / "out" / "imu.yaml").read_text()
 
 
 def test_pulses_and_wandering_bias_go_into_the_file(tmp_path: Path) -> None:

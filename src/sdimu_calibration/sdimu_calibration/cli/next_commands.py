@@ -12,7 +12,7 @@ from sdimu_calibration.cli.option_groups import words_by_option, words_of
 from sdimu_calibration.cli.options import Fitted, Place
 from sdimu_calibration.core.advice import Verb
 from sdimu_calibration.shell_words import joined
-from sdimu_calibration.storage.files.advice_words import added, lead, plan_options
+from sdimu_calibration.storage.files.advice_words import EXCLUDE, added, lead, plan_options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -75,6 +75,10 @@ def spelled(advice: Advice, asked: Asked) -> str:
         return f"{asked.command('calibrate')} {added(advice)}"
     if advice.verb == Verb.DIAGNOSE:
         return replace(asked, bags=asked.bags[:1]).command("diagnose")
+    if advice.verb == Verb.LEAVE_OUT:
+        return replace(asked, options=_without_times(asked.options, advice.about[0])).command("diagnose")
+    if advice.verb == Verb.CUT:
+        return _parted(asked, *advice.about)
     if advice.verb == Verb.CONTINUE:
         return joined(["sdimu", "plan", "--after", str(asked.folder)])
     if advice.verb in {Verb.REVERSE_PLAN, Verb.RANK_TURNS}:
@@ -82,6 +86,27 @@ def spelled(advice: Advice, asked: Asked) -> str:
         plan = str(asked.folder / PLAN) if asked.has_plan else _OWN_PLAN
         return f"sdimu plan {joined(['--plan', plan, *asked.place])} {plan_options(advice)}"
     return ""
+
+
+def _without_times(options: Sequence[str], span: str) -> list[str]:
+    """Add a span to the times that options leave out."""
+    out = list(options)
+    if EXCLUDE not in out:
+        return [*out, EXCLUDE, span]
+    out[out.index(EXCLUDE) + 1] += f",{span}"
+    return out
+
+
+def _parted(asked: Asked, end: str, begin: str) -> str:
+    """Write the commands that part the first bag and calibrate both parts; they have stops and times of their own."""
+    bag = asked.bags[0]
+    parts = [bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_{word}") for word in ("before", "after")]
+    cuts = [
+        joined(["sdimu", "bag", "cut", str(bag), option, at, "--out", str(part)])
+        for option, at, part in (("--to", end, parts[0]), ("--from", begin, parts[1]))
+    ]
+    together = Asked(parts, asked.options, asked.place, asked.folder).command("calibrate")
+    return " && ".join([*cuts, together])
 
 
 def print_advice(console: Console, advice: Sequence[Advice], asked: Asked) -> None:

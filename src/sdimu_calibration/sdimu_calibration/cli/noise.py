@@ -40,7 +40,7 @@ def noise(
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
     from sdimu_calibration.core.noise import rests, white_noise
-    from sdimu_calibration.report.noise import HEAD, misfits, write_page
+    from sdimu_calibration.report.noise import HEAD, misfits, no_rest, write_page
     from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.bags.file_room import check_own_file
     from sdimu_calibration.storage.files.config import find_config, load_imu, load_site
@@ -68,6 +68,7 @@ def noise(
     most = max(one.tau[-1] for one in deviations.values())
     words = [
         f"{len(rows)} rest{'s' if len(rows) > 1 else ''}, {seconds:.0f} s in all, averaging times up to {most:.0f} s.",
+        *filter(None, [no_rest(terms)]),
         *misfits(terms),
         *([] if site is None else [gravity_note(recording, rows, site)]),
         *recording.notes,
@@ -76,7 +77,7 @@ def noise(
     with written_together(folder) as part:
         write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms)
         write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
-        write_measured_imu(part / "imu.yaml", imu, measured, terms, [f"{MEASURED} {bag.name}: {words[0]}"])
+        write_measured_imu(part / "imu.yaml", imu, measured, terms, _head(bag, words[0], no_rest(terms)))
     print_table(console, HEAD, listed(terms), "terms of the Allan deviation, one sigma", left=2)
     for word in words:
         say(console, f"note: {word}")
@@ -85,6 +86,11 @@ def noise(
     say(console, f"results in {folder}; to use them:")
     command(console, joined(["sdimu", "calibrate", str(bag), "--imu", str(folder / "imu.yaml"), *place]))
     answer(folder / "noise.json", as_json)
+
+
+def _head(bag: Path, rests: str, no_rest: str) -> list[str]:
+    """Remarks at the head of imu.yaml; one a line."""
+    return [f"{MEASURED} {bag.name}: {rests}", *filter(None, [no_rest])]
 
 
 def _terms(

@@ -18,6 +18,10 @@ class Verb(StrEnum):
     """Put the stops of the plan that was driven into another order."""
     RANK_TURNS = auto()
     """Rank all turns by how well they tell effects from each other: the labels of these."""
+    CUT = auto()
+    """Part the recording: the end of its first part and the begin of the second (s after the first sample)."""
+    LEAVE_OUT = auto()
+    """Diagnose the recording without a span of time, such as ``66.5-66.8`` (s after the first sample)."""
     CONTINUE = auto()
     """Search a plan that begins with what is known of the unit."""
 
@@ -27,6 +31,12 @@ class Kind(StrEnum):
 
     MEND_RECORDING = auto()
     """What is wrong with it."""
+    PART_RECORDING = auto()
+    """What is wrong at the gap at which it is to be parted."""
+    LEAVE_OUT_TIMES = auto()
+    """What is wrong in the times that are to be left out."""
+    LOOK_FIRST = auto()
+    """What is wrong, and no fault of the samples."""
     REPEAT_STOPS = auto()
     CORRECT_NOISE = auto()
     """Ratios of measured to specified noise: gyro, accelerometer (1)."""

@@ -67,13 +67,32 @@ def misfits(found: Mapping[str, Terms]) -> list[str]:
         if not terms.misfit:
             continue
         line = f"{channel}: the terms do not explain the Allan deviation; their sigmas allow for it"
-        if terms.worst_ratio > _STANDS_OUT:
+        if _peaks(terms):
             line += (
                 f". At {terms.worst_s:.2g} s it is {terms.worst_ratio:.1f} times theirs, as a vibration or a base that "
                 f"rocks at {_PEAK / terms.worst_s:.2g} Hz makes it: record on a base at rest"
             )
         out.append(line)
     return out
+
+
+def no_rest(found: Mapping[str, Terms]) -> str:
+    """Say that the IMU moved in what was taken for rest, and what the noise is worth then; empty where it stood.
+
+    At rest a gyro shows the terms of its noise, and a peak beside them is a motion of the base.
+    """
+    moved = [name for name, one in found.items() if name.startswith("gyro") and one.misfit and _peaks(one)]
+    if not moved:
+        return ""
+    return (
+        f"what was taken for rest is none: the base rocks or vibrates ({', '.join(moved)}). White noise in imu.yaml "
+        "is an upper limit of that of the IMU, not its noise: record on a base at rest. On such a base take "
+        "the scatter of that recording (--noise estimated)"
+    )
+
+
+def _peaks(one: Terms) -> bool:
+    return one.worst_ratio > _STANDS_OUT
 
 
 _STANDS_OUT = 1.5

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import _at_stake, _in_sight, add, others, telling_turn, together
+from sdimu_calibration.core.diagnosis.advice import _at_stake, _in_sight, add, mend, others, telling_turn, together
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.grades import other_coefficients
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, TurnSeen
+from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
+from sdimu_calibration.storage.files.advice_words import lead as words_before_command
 from sdimu_calibration.storage.files.effect_file import find_effects
 
 MIX = """
@@ -139,3 +144,35 @@ def test_another_time_constant_of_the_same_effect_is_not_to_be_told_apart():
     (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
     rivals = ["gyro_bias_warm_up_x(tau=1200 s)", "gyro_bias_ramp_x", "gyro_bias_warm_up_y(tau=600 s)"]
     assert others(found(candidate, rivals)) == ("gyro_bias_ramp_x", "gyro_bias_warm_up_y(tau=600 s)")
+
+
+@pytest.mark.parametrize(
+    ("finding", "lead", "command"),
+    [
+        (
+            Finding("accelerometer x is at the end of its range", True, "saturated", 66.62, 66.68),
+            "Mend the recording first: accelerometer x is at the end of its range. Without that time",
+            "sdimu diagnose 'a bag' --imu dtg --exclude-times 66.6-66.7",
+        ),
+        (
+            Finding("samples are missing", True, "long gap", 150.0, 153.04),
+            "Mend the recording first: samples are missing. Part it at that gap, and calibrate both parts as two "
+            "recordings",
+            "sdimu bag cut 'a bag' --to 150.0 --out 'a bag_before' && sdimu bag cut 'a bag' --from 153.1 --out "
+            "'a bag_after' && sdimu calibrate 'a bag_before' 'a bag_after' --imu dtg",
+        ),
+        (Finding("turns are off", True, "misfit"), "Mend the recording first: turns are off.", ""),
+        (Finding("the passes did not converge", True), "Look at this first: the passes did not converge.", ""),
+    ],
+    ids=["clipped", "gap", "misfit", "no fault of samples"],
+)
+def test_a_fault_is_told_with_what_mends_it(finding, lead, command):
+    """ "Mend the recording first" did not say how."""
+    light = Finding("12 samples are missing", False, "gap", 1.0, 2.0)
+    (advice,) = mend(SimpleNamespace(findings=(finding, light)))
+    assert words_before_command(advice) == lead
+    asked = Asked((Path("a bag"),), ["--imu", "dtg"], [], Path("out"))
+    assert spelled(advice, asked) == command
+    more = Asked((Path("a bag"),), ["--exclude-times", "1-2"], [], Path("out"))
+    if "--exclude-times" in command:
+        assert spelled(advice, more) == "sdimu diagnose 'a bag' --exclude-times 1-2,66.6-66.7"

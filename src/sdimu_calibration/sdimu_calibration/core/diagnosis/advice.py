@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coefficients, without_variant
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
+from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.noise_term import FOLLOWS
@@ -75,8 +78,19 @@ def advice(
 
 
 def mend(d: Diagnosis) -> list[Advice]:
-    """Advise about every grave fault of the data."""
-    return [Advice(Kind.MEND_RECORDING, (f.text,)) for f in d.findings if f.grave]
+    """Advise about every grave fault of the data: what mends it, where something does."""
+    return [_mended(finding) for finding in d.findings if finding.grave]
+
+
+def _mended(fault: Finding) -> Advice:
+    if not fault.kind:
+        return Advice(Kind.LOOK_FIRST, (fault.text,))
+    begin, end = np.floor(10.0 * fault.start_s) / 10.0, np.ceil(10.0 * fault.end_s) / 10.0
+    if fault.kind == "long gap":
+        return Advice(Kind.PART_RECORDING, (fault.text,), Verb.CUT, (f"{begin:.1f}", f"{end:.1f}"))
+    if fault.kind == "saturated":
+        return Advice(Kind.LEAVE_OUT_TIMES, (fault.text,), Verb.LEAVE_OUT, (f"{begin:.1f}-{end:.1f}",))
+    return Advice(Kind.MEND_RECORDING, (fault.text,))
 
 
 def _about_data(d: Diagnosis) -> list[Advice]:

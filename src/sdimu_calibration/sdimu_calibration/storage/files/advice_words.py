@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.plain_text import capital
 
+EXCLUDE = "--exclude-times"
+"""Option that leaves times out."""
+
 
 def sentence(advice: Advice) -> str:
     """Return an advice as one sentence, its command included."""
@@ -32,6 +35,11 @@ def general_command(advice: Advice) -> str:
         return f"sdimu diagnose {' '.join(advice.about) or 'BAG'}"
     if advice.verb == Verb.CONTINUE:
         return "sdimu plan --after"
+    if advice.verb == Verb.LEAVE_OUT:
+        return f"{EXCLUDE} {advice.about[0]}"
+    if advice.verb == Verb.CUT:
+        end, begin = advice.about
+        return f"sdimu bag cut BAG --to {end} --out FIRST; sdimu bag cut BAG --from {begin} --out SECOND"
     return f"sdimu plan --plan YOURS {plan_options(advice)}"
 
 
@@ -85,6 +93,11 @@ def _keep(label: str) -> str:
 
 _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.MEND_RECORDING: lambda text: f"Mend the recording first: {text}.",
+    Kind.PART_RECORDING: lambda text: (
+        f"Mend the recording first: {text}. Part it at that gap, and calibrate both parts as two recordings"
+    ),
+    Kind.LEAVE_OUT_TIMES: lambda text: f"Mend the recording first: {text}. Without that time",
+    Kind.LOOK_FIRST: lambda text: f"Look at this first: {text}.",
     Kind.REPEAT_STOPS: lambda: (
         "The noise has a memory, which no compensation removes; values and sigmas take it into account. More "
         "stops, or the same attitudes again later, lower its share."

@@ -46,9 +46,9 @@ def write_measured_imu(
     content = imu_mapping(base)
     content["name"] = path.stem
     noise = {}
-    for triad, unit, white in (("gyro", GYRO_UNIT, measured.gyro), ("accel", ACCEL_UNIT, measured.accel)):
+    for triad, unit in (("gyro", GYRO_UNIT), ("accel", ACCEL_UNIT)):
         found = memory_of(terms, triad)
-        noise[triad] = f"{from_si(white_beside(white, found.get('quantisation', 0.0)), unit):.5g} {unit}"
+        noise[triad] = f"{from_si(white_of(measured, terms, triad, found.get('quantisation', 0.0)), unit):.5g} {unit}"
         for term, size in found.items():
             key, units = _MEMORY[term]
             noise[f"{triad}_{key}"] = f"{from_si(size, units[triad]):.3g} {units[triad]}"
@@ -57,6 +57,30 @@ def write_measured_imu(
     lines.append(f"# Grade and priors are those of '{base}': they are not measured here.")
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     write_whole(path, "\n".join(lines) + "\n" + text)
+
+
+def white_of(measured: WhiteNoise, terms: Mapping[str, Terms], triad: str, residue: float) -> float:
+    """White noise (SI) of a triad as a file states it: that of means over a second, at most what the terms allow.
+
+    On a base that rocks means over a second scatter by its motion, too. Where the terms do not explain the deviation of
+    an axis, its upper bound of white noise is the most that the IMU itself may have.
+
+    Parameters
+    ----------
+    terms : mapping of str to Terms
+        By channel.
+    triad : str
+        ``gyro`` or ``accel``.
+    residue : float
+        Quantisation of the triad (rad or m/s).
+    """
+    at_a_second = measured.gyro if triad == "gyro" else measured.accel
+    own = measured.channels[:3] if triad == "gyro" else measured.channels[3:]
+    k, bounds = TERMS.index("white"), []
+    for axis, density in zip("xyz", own, strict=True):
+        found = terms.get(f"{triad}_{axis}")
+        bounds.append(min(density, float(found.upper[k])) if found is not None and found.misfit else density)
+    return min(white_beside(at_a_second, residue), float(np.sqrt(np.mean(np.square(bounds)))))
 
 
 def memory_of(terms: Mapping[str, Terms], triad: str) -> dict[str, float]:
