@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
-from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
 from sdimu_calibration.core.diagnosis.verdict import beyond, error_falls
 from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -146,13 +146,13 @@ def candidate_rows(f: Found, told: Probabilities | None) -> list[list[str]]:
     `told`: where the sizes stand of what it may be instead.
     """
     own = f.candidate.coefficient
-    shares = {share.name: share.probability for share in f.may_be}
-    p = shares.get(own, f.probability)
+    percent = percents_of(f.may_be)
+    alone = in_percent(f.probability) if isfinite(f.probability) else ""
     unit = f.candidate.parameter.display_unit
     size = [amount(f.value, unit, 4), amount(f.sigma, unit, 2), unit]
-    rows = [[f.candidate.label, *size, in_percent(p) if isfinite(p) else "", f"{f.z:+.1f}"]]
+    rows = [[f.candidate.label, *size, percent.get(own, alone), f"{f.z:+.1f}"]]
     others = [share for share in f.may_be[:_TOP] if share.name != own and share.probability >= NAMED]
-    more = [[f"  or {one.name}", *_size_of(one.name, told), in_percent(one.probability), ""] for one in others]
+    more = [[f"  or {one.name}", *_size_of(one.name, told), percent[one.name], ""] for one in others]
     return rows + more
 
 

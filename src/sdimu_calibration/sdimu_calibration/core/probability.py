@@ -6,6 +6,7 @@ Functions of scipy.special, loaded when one is asked for: `scipy.stats` has the 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from statistics import NormalDist
 
 from sdimu_calibration.core.arrays import Floats
@@ -13,10 +14,28 @@ from sdimu_calibration.core.arrays import Floats
 GAUSS_MAD = 1.482602218505602
 """Ratio of sigma to median absolute deviation (1): that of a Gaussian, 1 over the normal quantile of 3/4."""
 
+_ROUNDING = 1e-9
+"""Part of a percent (1) that counts as none: a product of floats may be below a whole number by rounding."""
+
 
 def in_percent(p: float) -> str:
     """Write a probability for people: ``87 %``; beyond what two digits can say ``< 1 %`` and ``> 99 %``."""
     return "> 99 %" if p > 0.995 else "< 1 %" if p < 0.005 else f"{100.0 * p:.0f} %"
+
+
+def in_percents(shares: Sequence[float]) -> list[str]:
+    """Write probabilities of a list for people, so that what is written adds up as they do.
+
+    Each is its number of whole percents or one more; the largest remainders get the one, until the sum is that of the
+    list, rounded: .515 and .485 are 52 % and 48 %, not 49 %.
+    """
+    whole = [math.floor(100.0 * p + _ROUNDING) for p in shares]
+    missing = round(100.0 * math.fsum(shares)) - sum(whole)
+    by_remainder = sorted(range(len(whole)), key=lambda k: whole[k] - 100.0 * shares[k])
+    for k in by_remainder[: max(missing, 0)]:
+        whole[k] += 1
+    limits = (in_percent(p) for p in shares)
+    return [told if told[0] in "<>" else f"{number} %" for told, number in zip(limits, whole, strict=True)]
 
 
 def normal_tail(z: float) -> float:

@@ -11,7 +11,7 @@ from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
-from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -183,7 +183,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
 
 def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
     """Say what each effect that was found may be, itself first, each with its probability in words."""
-    named = {one.candidate.label: {share.name: in_percent(share.probability) for share in one.may_be} for one in found}
+    named = {one.candidate.label: percents_of(one.may_be) for one in found}
     return {label: shares for label, shares in named.items() if len(shares) > 1}
 
 
@@ -202,7 +202,7 @@ def found_table(summary: DiagnosisSummary) -> str:
             fall = (one.held_out_before, one.held_out_after)
             cells = (
                 size,
-                in_percent(p) if np.isfinite(p := _own_share(one)) else "",
+                _own_share(one),
                 f"{one.z:+.1f}",
                 f"{one.log_bayes_factor:.0f}",
                 f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else "",
@@ -216,10 +216,10 @@ def found_table(summary: DiagnosisSummary) -> str:
     return f'{tried}<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def _own_share(one: Found) -> float:
-    """Probability that it is this very coefficient; that of its class where it has no others."""
-    shares = {share.name: share.probability for share in one.may_be}
-    return shares.get(one.candidate.coefficient, one.probability)
+def _own_share(one: Found) -> str:
+    """Probability, in words, that it is this very coefficient; that of its class where it has no others."""
+    alone = in_percent(one.probability) if np.isfinite(one.probability) else ""
+    return percents_of(one.may_be).get(one.candidate.coefficient, alone)
 
 
 def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
@@ -228,7 +228,7 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
     for one in summary.found:
         if not one.alike and not one.together:
             continue
-        shares = {share.name: f" {in_percent(share.probability)}" for share in one.may_be}
+        shares = {name: f" {text}" for name, text in percents_of(one.may_be).items()}
         # Time constants of one coefficient share its probability: it stands once.
         alike = {name.partition("(")[0]: name for name in reversed(one.alike)}
         others = "; ".join(

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sdimu_calibration.cli.diagnosis_text import candidate_rows
 from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.advice import advice, handheld_advice
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
@@ -57,6 +58,13 @@ def test_a_class_that_is_certain_says_which_member_is_open_each_with_its_probabi
     told = said(with_shares(summary, 0.995, (own(summary), 0.82), ("accel_cubic_x", 0.18)))
     assert told.startswith("Certain, but open which: accelerometer second-order nonlinearity K2, x (")
     assert told.endswith(f") 82 % or {named('accel_cubic_x')} 18 %.")
+
+
+def test_probabilities_of_one_list_add_up_in_the_sentence_and_in_the_table(summary):
+    told = with_shares(summary, 0.999, (own(summary), 0.515), ("accel_cubic_x", 0.485))
+    assert said(told).endswith(f") 52 % or {named('accel_cubic_x')} 48 %.")
+    rows = candidate_rows(told.found[0], told.diagnosis.probabilities)
+    assert [row[4] for row in rows] == ["52 %", "48 %"]
 
 
 def test_shares_beyond_all_are_said_to_be_of_two_that_may_be_there(summary):

@@ -13,7 +13,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import Probabilities, Share
-from sdimu_calibration.core.probability import in_percent
+from sdimu_calibration.core.probability import in_percent, in_percents
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 
@@ -110,9 +110,19 @@ def _open(one: Graded) -> str:
     """Name what it may be, each with its probability; the likeliest with its size."""
     sizes = {one.coefficient: f" ({one.size})"}
     shown = one.may_be[:LISTED]
-    told = [f"{named(s.name)}{sizes.get(s.name, '')} {in_percent(s.probability)}" for s in shown]
+    percent = percents_of(one.may_be)
+    told = [f"{named(s.name)}{sizes.get(s.name, '')} {percent[s.name]}" for s in shown]
     both = "; two of them may be there" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
     return f"{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
+
+
+def percents_of(shares: Iterable[Share]) -> dict[str, str]:
+    """Write the probability of each thing that something may be, by its name; those that are named add up."""
+    every = tuple(shares)
+    by_itself = {one.name: in_percent(one.probability) for one in every}
+    told = [one for one in every if one.probability >= NAMED]
+    together = in_percents([one.probability for one in told])
+    return by_itself | {one.name: text for one, text in zip(told, together, strict=True)}
 
 
 def _sized(one: Found) -> str:
