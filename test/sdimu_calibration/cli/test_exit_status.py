@@ -85,6 +85,14 @@ def test_a_misfit_that_a_calibration_notes_ends_with_3(capsys, warning):
     assert left(capsys, replace(FITS, warnings=(warning,))) == (3, f"sdimu: not to be trusted: {warning}\n")
 
 
+def test_the_whole_command_of_a_diagnosis_stands_once_in_the_place_of_advice_without_recordings(capsys):
+    status, err = left(capsys, replace(FITS, warnings=MISFITS), None, "sdimu diagnose a b")
+    assert status == 3
+    assert "run: sdimu diagnose" not in err
+    assert err.splitlines()[-1] == "sdimu: to learn what the model misses: sdimu diagnose a b"
+    assert left(capsys, FITS, None, "sdimu diagnose a b") == (0, "")
+
+
 def test_what_fits_ends_with_0_whatever_else_it_warns_of(capsys):
     assert left(capsys, FITS) == (0, "")
     assert left(capsys, replace(FITS, warnings=("accel_bias_x is 7 sigma outside the specification",))) == (0, "")
@@ -182,6 +190,8 @@ def test_calibrate_without_the_effect_ends_with_3_and_with_it_with_0(sdimu, bags
     status, answer, err = sdimu("calibrate", *bags[:number])
     assert (status, answer["format"]) == (3, "sdimu-result/1")
     assert "not to be trusted: the model" in err
+    # Of a set "run: sdimu diagnose" named no recordings.
+    assert number == 1 or f"\nsdimu: to learn what the model misses: sdimu diagnose {bags[0]} {bags[1]} " in err
     status, _, err = sdimu("calibrate", *bags[:number], "--add", "gyro_scale_asymmetry_y")
     assert status == 0, err
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
-from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.cli.next_commands import NOT_LOOKED_FOR, TO_LEARN, Asked, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, folder_for_result, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 
 _SAME_DEGC = 0.5
 """Difference of two temperatures (deg C) up to which no coefficient differs by what counts: thermometers scatter so."""
-_NOT_LOOKED_FOR = (
-    "Nobody has looked for small effects that the model lacks; one that the fit takes up moves a coefficient by many "
-    "of its sigmas. To look:"
-)
-"""What a calibration cannot know without a misfit."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +93,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     at = relative_line(result.references)
     tell(console, (*((at,) if at else ()), *notes, *(note for note in result.notes if note not in notes)))
     misfit = any(topic_of(note) in MISFITS for note in result.notes)
-    say(console, "To learn what the model misses:" if misfit else _NOT_LOOKED_FOR)
+    say(console, TO_LEARN if misfit else NOT_LOOKED_FOR)
     able = request if fit.diagnosable else replace(request, estimator=AUTO)
     command(console, Asked.of((bag,), folder, opening, able).command("diagnose"))
     say(console, f"results in {folder}")

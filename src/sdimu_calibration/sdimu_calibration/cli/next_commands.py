@@ -26,6 +26,13 @@ PLAN = "plan.yaml"
 _OWN_PLAN = "PLAN_OF_THIS_TEST.yaml"
 PLAN_SHOWN, PLAN_RUN, PLAN_CHOSEN = "The plan as the motion showed it", "The plan that was run", "The turns chosen for"
 """How the remark begins at the head of a plan that a verb leaves with its results: a new one may replace it."""
+TO_LEARN = "To learn what the model misses:"
+"""What is said before the command of a diagnosis where the model does not fit."""
+NOT_LOOKED_FOR = (
+    "Nobody has looked for small effects that the model lacks; one that the fit takes up moves a coefficient by many "
+    "of its sigmas. To look:"
+)
+"""What is said before it where the model fits: a calibration cannot know more without a misfit."""
 _ACCELERATION = 1.0
 """Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 _FIRST = ("site", "imu", "model", "noise", "estimator")
@@ -74,7 +81,7 @@ def spelled(advice: Advice, asked: Asked) -> str:
     if advice.verb == Verb.ADD:
         return f"{asked.command('calibrate')} {added(advice)}"
     if advice.verb == Verb.DIAGNOSE:
-        return replace(asked, bags=asked.bags[:1]).command("diagnose")
+        return asked.command("diagnose")
     if advice.verb == Verb.LEAVE_OUT:
         return replace(asked, options=_without_times(asked.options, advice.about[0])).command("diagnose")
     if advice.verb == Verb.CUT:

@@ -11,6 +11,7 @@ import typer
 
 from sdimu_calibration.cli.console import say
 from sdimu_calibration.core.data_error import DataError
+from sdimu_calibration.core.note import without_advice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,16 +65,20 @@ def tell(console: Console, notes: Iterable[str]) -> None:
         say(console, f"note: {note}")
 
 
-def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None) -> None:
+def leave(result: Calibration, diagnosed: tuple[Verdict, str] | None = None, to_diagnose: str = "") -> None:
     """Say on stderr which coefficients are one, and end with exit status 3 when a result is not to be trusted.
 
     `diagnosed` is the verdict of a diagnosis and its sentence. Where there is one, it judges what does not fit;
-    without, a misfit is enough.
+    without, a misfit is enough. `to_diagnose` is the whole command that stands once in the place of all advice to
+    diagnose.
     """
     for line in result.inseparable:
         typer.echo(f"sdimu: {line}", err=True)
     reasons = _reasons(result, diagnosed)
-    warn(reasons)
+    told = without_advice(reasons) if to_diagnose else tuple(reasons)
+    warn(told)
+    if told != tuple(reasons):
+        typer.echo(f"sdimu: to learn what the model misses: {to_diagnose}", err=True)
     if reasons:
         raise typer.Exit(NOT_TRUSTED)
 

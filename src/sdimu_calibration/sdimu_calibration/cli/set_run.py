@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from sdimu_calibration.cli.console import answer, plain, say
-from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
+from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.next_commands import NOT_LOOKED_FOR, TO_LEARN, Asked, print_advice, spelled
 from sdimu_calibration.cli.opened import folder_for_result, leave, printing, tell
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
-from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.note import MISFITS, topic_of, without_advice
 from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
@@ -83,14 +83,24 @@ def calibrate_together(asked: SetRequest) -> None:
     with _begun(console, asked) as (members, options, run, progress):
         result = _with_serial(judged_outcome(fit_set(members, options, run, progress=progress)), members)
         progress("done", 1.0)
+    about = to_repeat(asked, folder)
     with written_together(folder) as part:
         write_result(part / "result.json", result)
-        write_report(part / "report.html", result, title=page_title(asked, "Calibration", result), trace=_trace(asked))
+        write_report(
+            part / "report.html",
+            result,
+            title=page_title(asked, "Calibration", result),
+            trace=_trace(asked),
+            spell=partial(spelled, asked=about),
+        )
     printed(folder / "report.html")
     _show(console, result)
+    misfit = any(topic_of(note) in MISFITS for note in result.notes)
+    say(console, TO_LEARN if misfit else NOT_LOOKED_FOR)
+    command(console, about.command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", asked.request.as_json)
-    leave(result)
+    leave(result, to_diagnose=about.command("diagnose"))
 
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
@@ -122,7 +132,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     if found.error_without is not None:
         fell = " -> ".join(dict.fromkeys(f"{error:.3f}" for error in (found.error_without, held_out(found.after))))
         say(console, f"held-out error, a recording left out at a time, in one noise: {fell}")
-    _show(console, after, diagnosed=True)
+    _show(console, after)
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "set.json", asked.request.as_json)
@@ -222,11 +232,11 @@ def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:
     return result.with_serial(next((m.serial for m in members if m.serial), ""))
 
 
-def _show(console: Console, result: Calibration, diagnosed: bool = False) -> None:
-    """Print the table, the power-ons and what the user should know."""
+def _show(console: Console, result: Calibration) -> None:
+    """Print the table, the power-ons and what the user should know; the command of a diagnosis stands elsewhere."""
     from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.report.table import rich_table, rows
 
     console.print(rich_table(rows(result), table_heading(result)), soft_wrap=True)
     at = relative_line(result.references)
-    tell(console, (*((at,) if at else ()), *(without_advice(result.notes) if diagnosed else result.notes)))
+    tell(console, (*((at,) if at else ()), *without_advice(result.notes)))
