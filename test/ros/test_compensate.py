@@ -155,6 +155,33 @@ def test_the_node_compensates_as_the_core_does_and_keeps_a_good_result(bench: Fi
             assert found.orientation_covariance[0] == -1.0
 
 
+def test_samples_of_no_time_of_the_test_are_left_out(bench: FitSession, rig: Rig) -> None:
+    """One stamped days ahead went out as it came, ended the stream at once, and moved all that hangs on time."""
+    result = drawn(6)
+    write_result(bench.folder / "result.json", result)
+    bench.children.start("compensate", "sdimu_calibration.nodes.compensate_node", {"result": str(bench.folder)})
+    rng = np.random.default_rng(7)
+    n, day = 60, 86_400 * 10**9
+    omega, force = rng.standard_normal((n, 3)), 10.0 * rng.standard_normal((n, 3))
+    stamps = START_NS + INTERVAL_NS * np.arange(1, n + 1)
+    sent = stamps.copy()
+    # The first sample, one, and three in a row.
+    strays = np.array([0, 20, 40, 41, 42])
+    sent[strays] += np.array([-9, 3, 5, 5, 5]) * day
+    rig.spin_until(lambda: rig.raw.get_subscription_count() > 0, "the node listens")
+    rig.spin_until(lambda: rig.node.count_publishers("/imu/data") > 0, "the node offers")
+    rig.executor.spin_until_future_complete(Future(), 1.0)  # both ends of a match are not made at once
+    for message in encode_imu(sent, omega, force, "imu_link"):
+        rig.raw.publish(message)
+    rig.spin_until(lambda: int(stamps[-1]) in rig.out, "samples come back")
+    kept = np.setdiff1d(np.arange(n), strays)
+    assert sorted(rig.out) == stamps[kept].tolist()
+    expected = compensate(compensator(result, load_imu("dtg")), np.arange(1, n + 1) * 0.01, 0.01, omega, force)
+    for k in kept.tolist():
+        rate = rig.out[int(stamps[k])].angular_velocity
+        np.testing.assert_allclose([rate.x, rate.y, rate.z], expected.omega_ib_b[k], rtol=1e-12)
+
+
 def test_the_node_follows_the_temperature_by_its_polynomial(bench: FitSession, rig: Rig) -> None:
     warm = (
         "gyro_scale_temperature",

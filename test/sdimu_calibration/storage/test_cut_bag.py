@@ -7,6 +7,7 @@ import pytest
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
+from sdimu_calibration.storage.bags.bag_file import read_topics
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.bags.cut_bag import cut_bag
@@ -69,3 +70,26 @@ def test_topics_that_the_calibration_does_not_read_are_left_out(tmp_path):
         bag.write_merged({"/imu/data_raw": (ns, cdr.encode_imu(ns, np.zeros((N, 3)), np.ones((N, 3))))})
         bag.write("/cmd_vel", bytes(52), 5)
     assert cut_bag(tmp_path / "bag", tmp_path / "part", 1.0, 2.0).counts == {"/imu/data_raw": 101}
+
+
+@pytest.mark.parametrize("row", [0, 500, N - 1], ids=["first", "middle", "last"])
+@pytest.mark.parametrize("days", [-400, 3])
+def test_samples_stamped_days_away_are_no_part_and_are_told(bag, tmp_path, row, days):
+    """A sample stamped days ahead was the end of the recording, and its part held everything."""
+    ns, messages = cdr.by_stamp(list(read_topics(bag, lambda *_: True)["/imu/data_raw"].raw), "/imu/data_raw")
+    messages[row] = cdr.stamped(messages[row], int(ns[row]) + days * 86_400_000_000_000)
+    with McapBag(tmp_path / "odd") as odd:
+        odd.topic("/imu/data_raw", cdr.IMU)
+        odd.topic("/imu/temperature", cdr.TEMPERATURE)
+        for at, message in zip(ns.tolist(), messages, strict=True):
+            odd.write("/imu/data_raw", message, at)
+        away = int(ns[-1]) + 400 * 86_400_000_000_000
+        for at, stamp in ((int(ns[0]), int(ns[0])), (int(ns[5]), int(ns[5])), (int(ns[9]), away)):
+            odd.write("/imu/temperature", cdr.encode_temperature(np.array([stamp]), np.array([20.0]))[0], at)
+    part = cut_bag(tmp_path / "odd", tmp_path / "part", 0.0, np.inf)
+    assert part.counts["/imu/data_raw"] == N - 1
+    assert part.counts["/imu/temperature"] == 2
+    assert part.whole_s == pytest.approx(9.99, abs=0.011)
+    assert part.notes[0].startswith("/imu/data_raw: 1 sample has a stamp outside the test")
+    assert part.notes[1].startswith("/imu/temperature: 1 message has a stamp outside the test")
+    assert read_recording(tmp_path / "part").notes == ()

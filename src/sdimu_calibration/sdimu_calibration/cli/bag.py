@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, command, plain, say
+from sdimu_calibration.cli.opened import tell
 from sdimu_calibration.cli.options import BagArgument, JsonOption
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.plain_text import one_line
@@ -55,6 +56,7 @@ def cut(
     console = plain()
     console.print(f"{out}: {first:g} s to {end} of {part.whole_s:.1f} s", soft_wrap=True)
     console.print(f"  {kept}", soft_wrap=True)
+    tell(console, part.notes)
 
 
 @app.command()

@@ -7,7 +7,8 @@ result does not say it; NaN: as the result says), stay (do not leave at the end 
 Service ~/reload (std_srvs/Trigger) reads the result again, by the parameters as they are then; when it cannot be used
 the answer says why and the result in use stays.
 
-Every sample that comes goes out, with its stamp. The first waits for the second, which tells the sample interval.
+Every sample that comes goes out, with its stamp, but those whose stamp is of no time of the test. The first ones wait
+for the fourth: their stamps tell that time, and the sample interval.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from std_srvs.srv import Trigger
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compensation import Compensator, compensate, compensator, heat_since
 from sdimu_calibration.core.data.recent_log import RecentLog
+from sdimu_calibration.core.data.stray_stamps import Block, StampSieve, stray_note
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, TemperatureLog
 from sdimu_calibration.nodes.convert import NS
 from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
@@ -65,7 +67,8 @@ class CompensateNode:
         self._start_ns: int | None = None
         self._stamps: list[int] = []
         self._interval = 0.0
-        self._held: list[bytes] = []
+        self._held: list[Block] = []
+        self._sieve = StampSieve()
         self._heat = RecentLog(1)
         self._departed: float | None = None
         self._using, self._frame = self._load()
@@ -125,36 +128,44 @@ class CompensateNode:
             self._heat.keep(self._heat.ns > now - _REMEMBERED_NS)
 
     def _take(self, message: bytes) -> None:
-        self._held.append(message)
         try:
-            stamps, omega, force = decode_imu(self._held)
+            came = self._sieve.take(*decode_imu([message]))
         except LayoutError as error:
-            self._held = []
             self.node.get_logger().warning(f"{RAW}: a message cannot be read ({error}) and was dropped")
             return
-        if not self._known_interval(int(stamps[-1])):
-            return
-        self._held = []
+        strays = self._sieve.strays()
+        if len(strays):
+            self.node.get_logger().warning(f"{RAW}: {stray_note(strays)}", once=True)
+        self._held.append(came)
+        if self._known_interval(came[0].tolist()):
+            stamps, omega, force = (np.concatenate(part) for part in zip(*self._held, strict=True))
+            self._held = []
+            self._send_finite(stamps, omega, force)
+        # Counted as they come, so that a credit means: taken and, but for what waits or is left out, sent on.
+        self._stream.reached(self._reached_ns(), 1)
+
+    def _reached_ns(self) -> int:
+        """Newest stamp (ns) that was sent on; 0 while the first samples wait."""
+        return 0 if self._held else max(self._sieve.newest_ns, 0)
+
+    def _send_finite(self, stamps: Stamps, omega: Floats, force: Floats) -> None:
         finite = np.isfinite(omega).all(axis=1) & np.isfinite(force).all(axis=1)
         if not finite.all():
             self.node.get_logger().warning(f"{RAW}: samples that are not finite are dropped", once=True)
             stamps, omega, force = stamps[finite], omega[finite], force[finite]
         self._send(stamps, omega, force)
-        # Counted as they come, so that a credit means: taken and sent on.
-        if len(stamps):
-            self._stream.reached(int(stamps[-1]), len(stamps))
 
-    def _known_interval(self, stamp: int) -> bool:
-        """Learn the nominal sample interval from the first stamps; False while there is only one."""
-        if len(self._stamps) <= NOMINAL_FROM:
-            self._stamps.append(stamp)
+    def _known_interval(self, stamps: list[int]) -> bool:
+        """Learn the nominal sample interval (s) from the first stamps (ns); False while there are too few."""
+        if stamps and len(self._stamps) <= NOMINAL_FROM:
+            self._stamps = [*self._stamps, *stamps][: NOMINAL_FROM + 1]
             steps = np.diff(self._stamps)
             if not (steps > 0).any():
                 return False
             self._interval = float(np.median(steps[steps > 0])) / NS
-        if self._start_ns is None:
+        if self._start_ns is None and self._interval:
             self._start_ns = self._stamps[0] - round(self._interval * NS)
-        return True
+        return self._start_ns is not None
 
     def _send(self, stamps: Stamps, omega: Floats, force: Floats) -> None:
         assert self._start_ns is not None

@@ -54,7 +54,7 @@ def test_a_status_of_another_time_is_told_and_costs_no_memory(which, clock_s):
     assert len(found.phase.t) == 121
     assert abs(found.phase.t[0]) < 1.0
     told = " ".join(found.notes)
-    assert "/rate_table/status: 1 messages have stamps outside the test" in told
+    assert "/rate_table/status: 1 message has a stamp outside the test" in told
     assert date in told
 
 
@@ -62,7 +62,7 @@ def test_a_temperature_of_another_time_is_no_beginning():
     heat = RawTemperature(np.append(each_second(), 0), np.append(np.full(121, 20.0), 85.0))
     found = in_order(raw_test(each_second(), temperature=heat))
     assert (found.temperature.value == 20.0).all()
-    assert "/imu/temperature: 1 messages" in found.notes[-1]
+    assert "/imu/temperature: 1 message has" in found.notes[-1]
 
 
 def test_samples_and_status_of_many_years_are_not_laid_out():

@@ -17,7 +17,7 @@ from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
 from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps
-from sdimu_calibration.core.data.strays import stamp_text, strays
+from sdimu_calibration.core.data.strays import strays, strays_note
 from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import (
@@ -326,6 +326,5 @@ def _without_strays(ns: Ints, order: Ints, samples_ns: Ints, topic: str, notes: 
     """Leave messages of no time of the test out of `order`, rows of `ns` by their stamps, and say so."""
     away = strays(ns[order], samples_ns)
     if away.any():
-        first, count = stamp_text(int(ns[order][away][0])), np.count_nonzero(away)
-        notes.append(f"{topic}: {count} messages have stamps outside the test (the first {first}): ignored")
+        notes.append(strays_note(topic, ns[order][away]))
     return order[~away]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Ints
+from sdimu_calibration.core.plain_text import counted
 
 FAR_NS = 86_400_000_000_000
 """Distance from the samples (ns) from which a message is of another time: a day, longer than a table stands still."""
@@ -34,6 +35,20 @@ def strays(ns: Ints, samples_ns: Ints) -> Bools:
     # Another clock: a day more than the test lasts, about the middle of its messages.
     length = len(samples_ns) * float(np.median(np.diff(samples_ns)))
     return np.asarray(np.abs((ns - ns[len(ns) // 2]).astype(np.float64)) > FAR_NS + length)
+
+
+def strays_note(topic: str, strays_ns: Ints) -> str:
+    """Say which messages of a side topic are left out.
+
+    Parameters
+    ----------
+    topic : str
+        Name of the topic.
+    strays_ns : ndarray of int, shape (m,)
+        Their stamps (ns), at least one.
+    """
+    what = counted(len(strays_ns), "message has a stamp", "messages have stamps")
+    return f"{topic}: {what} outside the test (the first {stamp_text(int(strays_ns[0]))}): ignored"
 
 
 def _distance(ns: Ints, samples_ns: Ints) -> Ints:
