@@ -46,6 +46,20 @@ def test_a_csv_becomes_a_bag_in_si(folder, monkeypatch, capsys):
     assert not run(monkeypatch, *arguments, "--replace")
 
 
+@pytest.mark.parametrize("other", ["format: sdimu-plan/1\nname: mine\n", "format: sdimu-imu/1\n"])
+def test_a_map_replaces_no_file_of_another_kind(folder, monkeypatch, capsys, other):
+    """--replace of a proposed map took whatever file had its name."""
+    path = folder / "a_map.yaml"
+    path.write_text(other)
+    arguments = ("import", folder / "a.csv", "--out", folder / "bag", "--replace")
+    assert run(monkeypatch, *arguments) == 1
+    assert f"{path}: is a file of another kind ({other.split()[1].partition('/')[0]})" in capsys.readouterr().err
+    assert path.read_text() == other
+    path.write_text(MAP)
+    assert not run(monkeypatch, *arguments)
+    assert path.read_text() != MAP
+
+
 def test_a_bad_cell_ends_with_one_line_and_no_bag(folder, monkeypatch, capsys):
     path = folder / "a.csv"
     path.write_text(path.read_text().replace("0.500000000,1.000000000", "0.500000000,one"))

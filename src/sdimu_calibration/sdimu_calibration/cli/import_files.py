@@ -99,15 +99,17 @@ def _set_of(console: Console, folder: Path, bags: Sequence[Path], replace: bool)
 
 def _propose(console: Console, files: Sequence[Path], out: Path | None, each: bool, replace: bool) -> None:
     """Write maps that probably fit, and say how to go on."""
-    from sdimu_calibration.storage.bags.file_room import check_no_source
+    from sdimu_calibration.storage.bags.file_room import check_file_room
     from sdimu_calibration.storage.importing.map_proposal import propose_maps
 
     folder = Path() if out is None else out.parent
-    for proposal in propose_maps(files):
-        path = folder / f"{files[0].stem}{proposal.suffix}_map.yaml"
+    proposals = {folder / f"{files[0].stem}{one.suffix}_map.yaml": one for one in propose_maps(files)}
+    # None is written where one has no room.
+    for path in proposals:
         if path.exists() and not replace:
             raise DataError(f"{path}: the map is there already: use it (--map {path}), or make it anew (--replace)")
-        check_no_source(path, "--out", files)
+        check_file_room(path, "--out", kind="sdimu-import", replace=replace, sources=files)
+    for path, proposal in proposals.items():
         write_whole(path, proposal.text)
         for line in proposal.words:
             say(console, f"note: {line}")
