@@ -84,7 +84,7 @@ def test_samples_stamped_days_away_are_no_part_and_are_told(bag, tmp_path, row, 
         for at, message in zip(ns.tolist(), messages, strict=True):
             odd.write("/imu/data_raw", message, at)
         away = int(ns[-1]) + 400 * 86_400_000_000_000
-        for at, stamp in ((int(ns[0]), int(ns[0])), (int(ns[5]), int(ns[5])), (int(ns[9]), away)):
+        for at, stamp in ((int(ns[4]), int(ns[4])), (int(ns[5]), int(ns[5])), (int(ns[9]), away)):
             odd.write("/imu/temperature", cdr.encode_temperature(np.array([stamp]), np.array([20.0]))[0], at)
     part = cut_bag(tmp_path / "odd", tmp_path / "part", 0.0, np.inf)
     assert part.counts["/imu/data_raw"] == N - 1
