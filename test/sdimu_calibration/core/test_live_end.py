@@ -271,7 +271,7 @@ def test_the_end_of_a_run_by_hand_has_the_model_of_a_run_by_hand(tmp_path):
 
 def test_an_assumed_site_that_the_data_exclude_is_refused_live_and_offline(tmp_path):
     m = negated_force(messages("dtg"))
-    said = r"no site was stated, and the assumed one \(daejeon\).*--accel-sign -1 would fit"
+    said = r"no site was stated, and the assumed one \(daejeon\).*is the sign of the force turned: then --accel-sign -1"
     with pytest.raises(DataError, match=said):
         live(m, "dtg", site=None)[0].opened()
     with pytest.raises(DataError, match=said):

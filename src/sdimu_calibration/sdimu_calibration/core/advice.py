@@ -38,6 +38,8 @@ class Kind(StrEnum):
     LOOK_FIRST = auto()
     """What is wrong, and no fault of the samples."""
     REPEAT_STOPS = auto()
+    OTHER_GRADE = auto()
+    """What the rests show beside what the file states, and which file fits."""
     CORRECT_NOISE = auto()
     """Ratios of measured to specified noise: gyro, accelerometer (1)."""
     UNKNOWN_CAUSE = auto()

@@ -15,6 +15,8 @@ class Topic(StrEnum):
     """A coefficient is not the same in all recordings of a set."""
     NOT_TRUSTED = auto()
     """The estimate must not be used as it stands."""
+    OTHER_GRADE = auto()
+    """The file of the IMU is of one of another grade."""
     INSEPARABLE = auto()
     """Two coefficients are one in a test."""
 

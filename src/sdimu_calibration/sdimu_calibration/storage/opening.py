@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 from sdimu_calibration.core.data.arrival import RawTest, in_order
@@ -19,7 +21,7 @@ from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.topic_choice import TopicChoice
-from sdimu_calibration.storage.files.config import load_imu, load_site, stated_path
+from sdimu_calibration.storage.files.config import load_imu, load_site, names_of, stated_path
 
 DEFAULT_SITE = "daejeon"
 CLASSES = ("dtg", "fog_tactical", "mems_by_hand")
@@ -104,6 +106,16 @@ def opening_options(
     )
 
 
+@cache
+def known_imus() -> tuple[ImuSpecification, ...]:
+    """Read the files of config/imu; one that is none of an IMU is no candidate."""
+    out = []
+    for name in names_of("imu"):
+        with suppress(DataError):
+            out.append(load_imu(name))
+    return tuple(out)
+
+
 def open_test(
     path: Path,
     site: str | None,
@@ -131,7 +143,7 @@ def open_test(
     opened = open_recorded(read_recording(path, source.topics), options, str(path))
     assumed = options.assumed_site if opened.site else ""
     origin = said_of(Path(path), (site or DEFAULT_SITE) if opened.site else "")
-    return PreparedTest(*opened, assumed_site=assumed, origin=origin)
+    return PreparedTest(*opened, assumed_site=assumed, origin=origin, known_imus=known_imus)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +183,7 @@ class Opening:
         site = (self.site or DEFAULT_SITE) if opened.site else ""
         origin = Origin(recording=raw.where, site=one_line(Path(site).stem), site_file=stated_path(site))
         assumed = options.assumed_site if opened.site else ""
-        return self._of(PreparedTest(*opened, assumed_site=assumed, origin=origin))
+        return self._of(PreparedTest(*opened, assumed_site=assumed, origin=origin, known_imus=known_imus))
 
     def _of(self, test: PreparedTest) -> PreparedTest:
         """Let a test have what is stated of it."""

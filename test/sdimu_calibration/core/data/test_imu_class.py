@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from sdimu_calibration.core.data.imu_class import understated_noise
+from sdimu_calibration.core.data.imu_class import other_grade, understated_noise
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DivergedError
+from sdimu_calibration.storage.opening import known_imus
 
 GYROS = "gyros show 0.1 deg/h/sqrt(Hz) at rest where quiet states 0.001"
 REMEDY = "; take --noise estimated"
@@ -57,3 +58,24 @@ def test_without_a_rest_nothing_is_said(bench):
     first = bench.recording()
     short = replace(first, t=first.t[:20], omega_ib_b=first.omega_ib_b[:20], f_ib_b=first.f_ib_b[:20])
     assert understated_noise(short, quieter(bench.imu, 100.0)) == ""
+
+
+@pytest.mark.parametrize(("factor", "states"), [(50.0, "0.002"), (1.0 / 50.0, "5")], ids=["quieter", "noisier"])
+def test_a_file_of_another_grade_is_told_with_the_one_that_fits(bench, factor, states):
+    """A diagnosis advised a factor of the noise, which would have left the priors of another IMU."""
+    known = (replace(bench.imu, name="near", gyro_white_noise=1.5 * bench.imu.gyro_white_noise), bench.imu)
+    told = other_grade(bench.recording(), quieter(bench.imu, factor), lambda: known)
+    assert f"gyros show 0.1 deg/h/sqrt(Hz) at rest where quiet states {states}" in told
+    assert f"the IMU is probably of another grade: {bench.imu.name} fits (--imu {bench.imu.name})" in told
+
+
+def test_noise_far_above_the_file_is_told_without_a_file_that_fits_and_noise_below_is_not(bench):
+    none = (replace(bench.imu, name="far", gyro_white_noise=1e3 * bench.imu.gyro_white_noise),)
+    recording = bench.recording()
+    assert other_grade(recording, quieter(bench.imu, 50.0), lambda: none).endswith(REMEDY)
+    assert other_grade(recording, quieter(bench.imu, 1.0 / 50.0), lambda: none) == ""
+    assert other_grade(recording, bench.imu, lambda: (bench.imu,)) == ""
+
+
+def test_a_bag_knows_the_files_that_may_be_named():
+    assert {"dtg", "fog_tactical", "mems_consumer"} <= {imu.name for imu in known_imus()}

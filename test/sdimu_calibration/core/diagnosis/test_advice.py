@@ -11,7 +11,16 @@ import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import _at_stake, _in_sight, add, mend, others, telling_turn, together
+from sdimu_calibration.core.diagnosis.advice import (
+    _about_data,
+    _at_stake,
+    _in_sight,
+    add,
+    mend,
+    others,
+    telling_turn,
+    together,
+)
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.grades import other_coefficients
@@ -20,6 +29,8 @@ from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import split
+from sdimu_calibration.core.noise_term import MARKOV, NoiseTerm
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
 from sdimu_calibration.storage.files.advice_words import lead as words_before_command
@@ -176,3 +187,19 @@ def test_a_fault_is_told_with_what_mends_it(finding, lead, command):
     more = Asked((Path("a bag"),), ["--exclude-times", "1-2"], [], Path("out"))
     if "--exclude-times" in command:
         assert spelled(advice, more) == "sdimu diagnose 'a bag' --exclude-times 1-2,66.6-66.7"
+
+
+def test_a_file_of_another_grade_is_the_first_advice_and_no_factor_is():
+    noise = SimpleNamespace(ratio=4.8, sigma=0.2)
+    unknown = SimpleNamespace(ratio=0.0, sigma=3.0)
+    seen = SimpleNamespace(gyro=unknown, accel=noise)
+    lines = ("accel white noise is 4.80 +- 0.20 times the specification",)
+    learned = SimpleNamespace(noise=(NoiseTerm("gyro", MARKOV),))
+    grade = Note("gyros show 4.2; fog_tactical fits", Topic.OTHER_GRADE)
+    d = SimpleNamespace(findings=(), consistency=seen, found=learned, noise=(grade, *lines))
+    assert sentence(_about_data(d)[0]) == "Look at the IMU's file first: gyros show 4.2; fog_tactical fits."
+    assert not any(one.kind == Kind.CORRECT_NOISE for one in _about_data(d))
+    d.noise, d.found = (*lines, "gyro Gauss-Markov"), learned
+    # "gyro times 0.00" was advised where noise with a memory hides the white noise.
+    (factor,) = (one for one in _about_data(d) if one.kind == Kind.CORRECT_NOISE)
+    assert factor.arguments == (1.0, 4.8)

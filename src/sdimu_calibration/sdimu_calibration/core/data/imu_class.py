@@ -7,7 +7,7 @@ priors of its grade, wider where the rests show larger biases, and the noise of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -23,6 +23,8 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import STANDARD_GRAVITY, from_si
 from sdimu_calibration.core.wording import Option
 
+KnownImus = Callable[[], Sequence[ImuSpecification]]
+"""Gives the files of IMUs that may be named; none are read before one is asked for."""
 _TAU_S = (2.0, 8.0)
 """Averaging times (s) beside the half second of static detection: long enough for pulses of a ring laser gyro."""
 _FEWEST = 20
@@ -60,6 +62,21 @@ class RestsShown:
             f"{from_si(self.accel_noise, 'ug/sqrt(Hz)'):.2g} ug/sqrt(Hz), mean rate "
             f"{from_si(self.rate, 'deg/h'):.2g} deg/h, force {from_si(self.force_error, 'mg'):.2g} mg from gravity"
         )
+
+    def beside(self, imu: ImuSpecification) -> list[tuple[str, float]]:
+        """Give the noise of gyros and accelerometers beside the stated one, in words and as their ratio (1)."""
+        pairs = (
+            ("gyros", self.gyro_noise, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
+            ("accelerometers", self.accel_noise, imu.accel_white_noise, "ug/sqrt(Hz)"),
+        )
+        return [
+            (
+                f"{whose} show {from_si(seen, unit):.2g} {unit} at rest where {imu.name} states "
+                f"{from_si(stated, unit):.2g}",
+                seen / stated,
+            )
+            for whose, seen, stated, unit in pairs
+        ]
 
     def fits(self, imu: ImuSpecification) -> bool:
         """Whether an IMU of a specification may rest like this."""
@@ -108,13 +125,15 @@ def shown_at_rest(recording: Recording) -> RestsShown | None:
     return RestsShown(gyro, accel, float(np.median(rate)), float(np.median(error)), float(error.max()))
 
 
-def understated_noise(recording: Recording, imu: ImuSpecification) -> str:
+def understated_noise(recording: Recording, imu: ImuSpecification, known: KnownImus = tuple) -> str:
     """Say that the rests are far noisier than a specification states; empty where they are not, or there is no rest.
 
     Parameters
     ----------
     recording : Recording
         In SI.
+    known : callable
+        Gives the files of other IMUs, of which one may fit.
 
     Returns
     -------
@@ -122,20 +141,49 @@ def understated_noise(recording: Recording, imu: ImuSpecification) -> str:
         A part of a sentence: what is measured against what is stated, and what to do.
     """
     shown = shown_at_rest(recording)
+    told = [] if shown is None else [text for text, ratio in shown.beside(imu) if ratio > _FAR_ABOVE]
+    if shown is None or not told:
+        return ""
+    remedy = _fitting(shown, known()) or f"take {Option.NOISE} estimated"
+    return f"the likely cause is the noise in the IMU's file: {', '.join(told)}; {remedy}"
+
+
+def other_grade(recording: Recording, imu: ImuSpecification, known: KnownImus) -> str:
+    """Say that a specification is of an IMU of another grade than the rests; empty where it is not.
+
+    A file that states far more noise than there is counts only where a known one fits: units are often better than
+    their data sheets.
+
+    Parameters
+    ----------
+    recording : Recording
+        In SI.
+    known : callable
+        Gives the files of other IMUs, of which one may fit.
+    """
+    shown = shown_at_rest(recording)
     if shown is None:
         return ""
-    pairs = (
-        ("gyros", shown.gyro_noise, imu.gyro_white_noise, "deg/h/sqrt(Hz)"),
-        ("accelerometers", shown.accel_noise, imu.accel_white_noise, "ug/sqrt(Hz)"),
-    )
-    told = [
-        f"{whose} show {from_si(seen, unit):.2g} {unit} at rest where {imu.name} states {from_si(stated, unit):.2g}"
-        for whose, seen, stated, unit in pairs
-        if seen > _FAR_ABOVE * stated
-    ]
-    if not told:
+    beside = shown.beside(imu)
+    above = [text for text, ratio in beside if ratio > _FAR_ABOVE]
+    below = [text for text, ratio in beside if ratio * _FAR_ABOVE < 1.0]
+    remedy = _fitting(shown, known()) if above or below else ""
+    if not remedy and not above:
         return ""
-    return f"the likely cause is the noise in the IMU's file: {', '.join(told)}; take {Option.NOISE} estimated"
+    return f"{', '.join([*above, *below])}; {remedy or f'take {Option.NOISE} estimated'}"
+
+
+def _fitting(shown: RestsShown, known: Sequence[ImuSpecification]) -> str:
+    """Advise to take the file whose noise and limits of rest are those of the rests, the nearest; empty for none."""
+
+    def distance(imu: ImuSpecification) -> float:
+        return float(np.max(np.abs(np.log([ratio for _, ratio in shown.beside(imu)]))))
+
+    fit = [imu for imu in known if shown.fits(imu) and distance(imu) < np.log(_FAR_ABOVE)]
+    if not fit:
+        return ""
+    name = min(fit, key=distance).name
+    return f"the IMU is probably of another grade: {name} fits ({Option.IMU} {name}), or take {Option.NOISE} estimated"
 
 
 def _white_noise(values: Floats, rests: StaticIntervals, interval_s: float, usual: float) -> float:

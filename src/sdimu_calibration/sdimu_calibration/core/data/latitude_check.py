@@ -135,8 +135,8 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
     if seen is not None and seen.excludes(site):
         raise DataError(
             f"{where}: {latitude_in_data(seen)}; no site was stated, and the assumed one ({name}) is at "
-            f"{_latitude(site)}: state yours{or_sign(seen, site)}. {Option.SITE} takes a name in config/site or a YAML "
-            "file with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
+            f"{_latitude(site)}: state yours{_or_turned(seen, site)}. {Option.SITE} takes a name in config/site or a "
+            "YAML file with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
             "site=...); node: parameter site)"
         )
     text = f"no {Option.SITE}: {name} is assumed (latitude {_latitude(site)}, height {site.height_m:.0f} m)"
@@ -152,8 +152,22 @@ def latitude_in_data(seen: EarthRate) -> str:
     return f"the Earth's rate in the data is that of latitude {latitude:.{digits}f} +- {sigma:.{digits}f} deg"
 
 
+def _or_turned(seen: EarthRate, site: Site) -> str:
+    """Say at which place the force would have the other sign, where the assumed site would fit then; else nothing.
+
+    Nobody stated that site, and the rests alone do not tell a place in the other hemisphere from a turned force.
+    """
+    if not reversed_force(seen, site):
+        return ""
+    latitude, sigma = np.degrees(seen.latitude)
+    return (
+        f" (only if it lies at latitude {-latitude:.0f} +- {sigma:.0f} deg is the sign of the force turned: then "
+        f"{Option.ACCEL_SIGN} -1, or 1 where -1 was stated)"
+    )
+
+
 def or_sign(seen: EarthRate, site: Site) -> str:
-    """Advise to turn the sign of the force where that would fit; else nothing."""
+    """Advise to turn the sign of the force where that would fit a site that was stated; else nothing."""
     told = f", or the sign of the force ({Option.ACCEL_SIGN} -1 would fit, or 1 where -1 was stated)"
     return told if reversed_force(seen, site) else ""
 

@@ -16,10 +16,12 @@ from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
 from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coefficients, without_variant
+from sdimu_calibration.core.diagnosis.measured_noise import is_off, of_other_grade
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
+from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.recording import DataError
@@ -98,9 +100,17 @@ def _about_data(d: Diagnosis) -> list[Advice]:
     # What follows attitude, rate or temperature is the same in every repetition.
     if any(term.kind not in FOLLOWS for term in d.found.noise):
         out.append(Advice(Kind.REPEAT_STOPS))
+    if grades := of_other_grade(d.noise):
+        # A factor would make a file of another IMU out of it, with the priors of this one.
+        return [*(Advice(Kind.OTHER_GRADE, (line,)) for line in grades), *out]
     if len(d.noise) > len(d.found.noise):
-        out.append(Advice(Kind.CORRECT_NOISE, (d.consistency.gyro.ratio, d.consistency.accel.ratio)))
+        out.append(Advice(Kind.CORRECT_NOISE, tuple(map(_factor, (d.consistency.gyro, d.consistency.accel)))))
     return out
+
+
+def _factor(noise: Noise) -> float:
+    """Ratio (1) of the white noise of a triad to that specified; 1 where nothing says that it is another one."""
+    return noise.ratio if is_off(noise) else 1.0
 
 
 def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list[Advice]:

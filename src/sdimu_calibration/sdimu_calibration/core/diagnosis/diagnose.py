@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.found import Found, found_effects
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.ladder import Rung, ladder
-from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise
+from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, is_stated, measured_noise, of_other_grade
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO, Round, in_found_noise, searched
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
@@ -192,7 +192,7 @@ def climb(
         consistency = base.consistency(done.evidence)
     if done.found.noise:
         consistency = without_memory(consistency, done.found.noise, stated)
-        noise, _ = measured_noise(consistency, base)
+        noise = (*of_other_grade(noise), *measured_noise(consistency, base)[0])
     # In the noise that was learned without the effects nothing would be seen to be missing.
     as_given = in_found_noise(request, base, done.found.noise) if done.chosen else done.fit
     # A missing effect that is found may be so large that without it there is no fit at all.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from sdimu_calibration.core.data.imu_class import other_grade
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_white_noise
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.consistency import Consistency, Noise
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, NoiseTerm
+from sdimu_calibration.core.note import Note, Topic, topic_of
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -45,6 +48,9 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     consistency = fit.consistency()
     noise, imu = measured_noise(consistency, fit)
     if noise:
+        test = fit.test
+        wrong = other_grade(test.recording, test.imu, test.known_imus)
+        noise = (*([Note(wrong, Topic.OTHER_GRADE)] if wrong else []), *noise)
         again = solve(
             fit.test.with_imu(imu),
             fit.model,
@@ -57,6 +63,16 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
     return in_white_noise(fit), consistency, noise
 
 
+def of_other_grade(noise: Sequence[str]) -> tuple[str, ...]:
+    """Lines on the noise that say that the IMU's file is of another grade."""
+    return tuple(line for line in noise if topic_of(line) == Topic.OTHER_GRADE)
+
+
+def is_off(noise: Noise) -> bool:
+    """Whether the white noise of a triad is not as specified, by more than chance and by what counts."""
+    return abs(noise.ratio - 1.0) > max(NOISE_OFF, 4.0 * noise.sigma)
+
+
 def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...], ImuSpecification]:
     """Say where the white noise is not as specified, and put the measured one in its place.
 
@@ -67,7 +83,7 @@ def measured_noise(consistency: Consistency, fit: Fit) -> tuple[tuple[str, ...],
     told: list[str] = []
     scales = {"gyro": 1.0, "accel": 1.0}
     for triad, noise in (("gyro", consistency.gyro), ("accel", consistency.accel)):
-        if abs(noise.ratio - 1.0) > max(NOISE_OFF, 4.0 * noise.sigma):
+        if is_off(noise):
             scales[triad] = noise.ratio
             told.append(f"{triad} white noise is {noise.ratio:.2f} +- {noise.sigma:.2f} times the specification")
         if noise.kurtosis > _KURTOSIS:

@@ -410,7 +410,8 @@ class NavigationFit(Fit):
 
     def _noise_in_words(self, nis: float) -> str:
         """Name the noise of the IMU's file where it is the likely cause of a misfit; the rests are looked at."""
-        told = understated_noise(self.test.recording, self.test.imu) if nis > _NOISY else ""
+        test = self.test
+        told = understated_noise(test.recording, test.imu, test.known_imus) if nis > _NOISY else ""
         return told and f"; {told}"
 
     def _lost_in_words(self) -> str:

@@ -12,6 +12,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, r
 from sdimu_calibration.core.alignment.without import without
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.blocks import let_go
+from sdimu_calibration.core.data.imu_class import KnownImus
 from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.handheld.handheld import PreparedRun, Told, prepare_run
 from sdimu_calibration.core.origin import Origin
@@ -43,6 +44,8 @@ class PreparedTest:
         Of a run by hand: sigmas beyond white noise, as of `RunScatter.sigmas`, where other recordings tell them.
     origin : Origin
         What the bag and the user say of the unit; an outcome adds what the recording says.
+    known_imus : callable
+        Gives the files of IMUs of which one may be named where the stated one is of another grade.
     """
 
     recording: Recording
@@ -55,6 +58,7 @@ class PreparedTest:
     rests: tuple[tuple[float, float], ...] = ()
     scatter: Floats | None = None
     origin: Origin = field(default_factory=Origin)
+    known_imus: KnownImus = tuple
     _prepared: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property

@@ -104,7 +104,7 @@ def solve(
     try:
         fit = replace(make(test, model, start, progress), reason=choice.reason)
     except DivergedError as error:
-        noise = understated_noise(test.recording, test.imu)
+        noise = understated_noise(test.recording, test.imu, test.known_imus)
         stated = ", ".join(one.name for one in model.priors)
         cause = (f"; {noise}" if noise else "") + (
             f"; check the priors that the model states: {stated}" if stated else ""

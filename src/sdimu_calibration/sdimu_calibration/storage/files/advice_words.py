@@ -102,6 +102,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "The noise has a memory, which no compensation removes; values and sigmas take it into account. More "
         "stops, or the same attitudes again later, lower its share."
     ),
+    Kind.OTHER_GRADE: lambda text: f"Look at the IMU's file first: {text}.",
     Kind.CORRECT_NOISE: lambda gyro, accel: (
         f"Correct the noise in the IMU's file: gyro times {gyro:.3g}, accelerometer times {accel:.3g}; look for "
         "outliers when the tails are heavy."

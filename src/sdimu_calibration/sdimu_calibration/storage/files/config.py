@@ -176,7 +176,7 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
         if path.is_file():
             return path
         if path.is_dir():
-            raise DataError(f"{path}: is a folder; name {_file_in(path, kind)}, or one of: {', '.join(_known(kind))}")
+            raise DataError(f"{path}: is a folder; name {_file_in(path, kind)}, or one of: {', '.join(names_of(kind))}")
         if path.exists():
             check_regular(path)
         raise DataError(f"{path}: no such {kind} file")
@@ -186,11 +186,11 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
             return folder / f"{text}{suffix}"
     if path.is_file():
         return path
-    known = _known(kind)
+    known = names_of(kind)
     raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
 
 
-def _known(kind: str) -> list[str]:
+def names_of(kind: str) -> list[str]:
     """Names in a folder of the configuration."""
     return sorted(p.stem for p in (config_folder() / kind).glob("*") if p.suffix in _SUFFIXES)
 
