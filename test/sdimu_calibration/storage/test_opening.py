@@ -155,7 +155,7 @@ def test_a_wrong_hemisphere_or_the_negative_of_the_force_is_asked_for_unless_sta
     assert np.array_equal(left.f_ib_b, -simulated().f_ib_b)
     assert any("--site" in note for note in left.notes)
     # Without a stated place the sign is not guessed from an assumed one: both are asked for.
-    said = r"no site was stated.*daejeon.*only if it lies at latitude -?\d+ .* the sign of the force turned: .*--accel-sign"
+    said = r"no site was stated.*only if it lies at latitude -?\d+ .* the sign of the force turned: .*--accel"
     with pytest.raises(DataError, match=said):
         open_test(path, None, DTG)
     assert np.array_equal(open_recording(path, Source(accel_sign=-1)).f_ib_b, simulated().f_ib_b)

@@ -136,8 +136,8 @@ def assumption(name: str, site: Site, seen: EarthRate | None, where: str) -> str
         raise DataError(
             f"{where}: {latitude_in_data(seen)}; no site was stated, and the assumed one ({name}) is at "
             f"{_latitude(site)}: state yours{_or_turned(seen, site)}. {Option.SITE} takes a name in config/site or a "
-            "YAML file with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: open(..., "
-            "site=...); node: parameter site)"
+            "YAML file with the lines 'format: sdimu-site/1', 'latitude_deg: ...' and 'height_m: ...' (Python: "
+            "open(..., site=...); node: parameter site)"
         )
     text = f"no {Option.SITE}: {name} is assumed (latitude {_latitude(site)}, height {site.height_m:.0f} m)"
     if seen is None or not seen.seen:
