@@ -220,7 +220,7 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
             "shown weakly or not at all by this plan, and taken as absent by the coefficients: "
             f"{taken_for_granted(summary.assumed)}",
         )
-    if summary.reached:
+    if any(r.testable for r in summary.reached):
         line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
 
 

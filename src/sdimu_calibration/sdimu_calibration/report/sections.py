@@ -16,6 +16,7 @@ from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
+from sdimu_calibration.core.evidence.testable import WORST_SENSOR
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -418,5 +419,7 @@ def _seen(entry: data.Scored) -> list[str]:
     else:
         size = f"{entry.smallest:.3g}"
         answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
+        if entry.smallest > WORST_SENSOR * entry.prior:
+            size, answer = "", "no: at no size that a sensor has"
     usual = f"{entry.prior:.3g}" if np.isfinite(entry.prior) else ""
     return [entry.label, size, entry.unit, usual, f"{100 * entry.retention:.1f} %", answer]

@@ -15,6 +15,7 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.testable import WORST_SENSOR
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
 
@@ -188,6 +189,7 @@ class DetectableSize:
     retention: float
     """Share of its signature that the model's coefficients leave."""
     testable: bool
+    """A size that a sensor may have would have been found."""
     partners: tuple[str, ...] = ()
     """Coefficients of the model that take the rest; given when it is not testable."""
 
@@ -204,7 +206,7 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
         smallest = np.where(left, POWER_80 / np.sqrt(np.abs(J)), np.inf)
     out = []
     for k, candidate in enumerate(evidence.candidates, start=p):
-        testable = bool(np.isfinite(scanned.sigma[k]))
+        testable = bool(np.isfinite(scanned.sigma[k]) and smallest[k] <= WORST_SENSOR * evidence.prior[k - p])
         partners = () if testable else _partners(evidence.names, full.J, evidence.weight, k)
         out.append(
             DetectableSize(

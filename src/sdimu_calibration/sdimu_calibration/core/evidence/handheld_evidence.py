@@ -16,6 +16,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.evidence.consistency import StopMean
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
+from sdimu_calibration.core.evidence.testable import WORST_SENSOR
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, Turns, seen_at_rest, turns
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint, equations, scatter_of
 from sdimu_calibration.core.handheld.run_scatter import PRIOR
@@ -25,9 +26,6 @@ CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", "turn
 """What is measured: rate and force at each rest, and the turn that led to it (the heading of north is arbitrary)."""
 _DOWN = len(CHANNELS) - 1
 """Index of a channel (1): that of the heading, which a whole turn tells."""
-_LARGEST = 30.0
-"""Factor on the one-sigma size that physics gives an effect: no sensor is worse, so what does not show at that size is
-not seen."""
 _ANY_ATTITUDE = 1.0
 """Sigma of the prior of an attitude (rad): none, but an attitude whose rows are left out stays finite."""
 
@@ -61,7 +59,7 @@ class HandheldEvidence(LinearEvidence):
         W = np.hstack(parts) / self.sigma[:, None]
         _, prior = candidate_priors(effects, self.imu)
         # What only shows by the gyros' answer to a force that is wrong in a turn is not seen: no sensor is so bad.
-        seen = _LARGEST * np.linalg.norm(W, axis=0) > 1.0 / prior
+        seen = WORST_SENSOR * np.linalg.norm(W, axis=0) > 1.0 / prior
         return np.where(seen, W, 0.0)
 
 

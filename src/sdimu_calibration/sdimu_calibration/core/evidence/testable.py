@@ -6,3 +6,6 @@ more than fifty times larger."""
 INDISTINGUISHABLE = 3.0
 """Difference of log-likelihoods or log Bayes factors (1) up to which two causes are not told apart: odds of 20 to 1 by
 the data; what is known before them says which is likelier."""
+WORST_SENSOR = 30.0
+"""Factor on the one-sigma size that physics gives an effect: no sensor is worse, so what does not show at that size is
+not seen."""

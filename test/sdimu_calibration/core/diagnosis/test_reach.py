@@ -1,0 +1,38 @@
+"""What a test could have seen: sizes that a sensor may have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.core.diagnosis import found
+from sdimu_calibration.core.evidence.testable import WORST_SENSOR
+from sdimu_calibration.report import data, sections
+
+
+@pytest.fixture(scope="module")
+def priors(diagnosis):
+    evidence = diagnosis.evidence.only(found.catalogue_columns(diagnosis))
+    return dict(zip((one.label for one in evidence.candidates), evidence.prior.tolist(), strict=True))
+
+
+def test_what_only_an_impossible_size_would_show_is_not_shown_by_the_plan(diagnosis, priors, monkeypatch):
+    """A recording that hardly turns was told to show a quadratic error from 37 g/g^2 on."""
+    whole = found.reach(diagnosis)
+    ratio = {one.label: one.smallest / priors[one.label] for one in whole}
+    assert all(ratio[one.label] <= WORST_SENSOR for one in whole if one.testable)
+    some = float(np.median([ratio[one.label] for one in whole if one.testable]))
+    monkeypatch.setattr(found, "WORST_SENSOR", some)
+    fewer = found.reach(diagnosis)
+    lost = [one for one, before in zip(fewer, whole, strict=True) if before.testable and not one.testable]
+    assert lost
+    assert all(ratio[one.label] > some for one in lost)
+
+
+def test_the_page_states_no_impossible_size(diagnosis):
+    entry = next(one for one in data.scored(diagnosis) if np.isfinite(one.smallest) and np.isfinite(one.prior))
+    huge = replace(entry, smallest=1.01 * WORST_SENSOR * entry.prior)
+    assert sections._seen(huge)[1] == ""
+    assert sections._seen(huge)[-1] == "no: at no size that a sensor has"
