@@ -10,14 +10,7 @@ import pytest
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence import learned_noise
 from sdimu_calibration.core.evidence.conditions import Conditions
-from sdimu_calibration.core.evidence.learned_noise import (
-    InModes,
-    NoiseInformation,
-    Wander,
-    given_terms,
-    learn,
-    likelihood,
-)
+from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, Wander, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
 from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, RATE, TEMPERATURE, TRIADS, NoiseTerm
@@ -240,12 +233,23 @@ def test_noise_of_one_sensor_is_in_that_sensor_alone(cut):
         np.testing.assert_allclose(R[:, own] @ R[:, own].T, covariance(cut, [term]), atol=1e-5)
 
 
+def test_terms_of_the_same_sensors_have_one_root_but_what_follows_something_its_own(cut):
+    walk, flicker = NoiseTerm("gyro", "random_walk", 0.0, 0.2), NoiseTerm("gyro", "flicker", 0.0, 0.7)
+    terms = (walk, NoiseTerm("gyro", "rate", 0.0, 0.3), flicker)
+    R, columns = root_of(terms, cut), columns_of(terms, cut)
+    np.testing.assert_allclose(R @ R.T, covariance(cut, terms), atol=1e-9)
+    for members, own in (([walk, flicker], columns[0]), ([terms[1]], columns[1])):
+        np.testing.assert_allclose(R[:, own] @ R[:, own].T, covariance(cut, members), atol=1e-9)
+    assert np.array_equal(columns[0], columns[2])
+    assert R.shape[1] == 3 * len(cut) + len(columns[1])
+
+
 def test_what_noise_of_some_sensors_adds_is_that_of_the_whole_covariance(cut):
     """Beside other terms, against the dense likelihood."""
     terms, information = of_some_sensors(cut)
     one, *others = terms
-    given = given_terms(information, cut, others)["accel"]
-    size, gain = InModes.of(*given, cut, one.kind, one.tau).sizes_on_grid(one.axes)
+    given = information.of_triad("accel", others, cut)
+    size, gain = InModes.of(given, cut, one.kind, one.tau).sizes_on_grid(one.axes)
     near = int(np.argmin(np.abs(np.log(size / one.size))))
     with_it = (replace(one, size=float(size[near])), *others)
 
@@ -255,4 +259,5 @@ def test_what_noise_of_some_sensors_adds_is_that_of_the_whole_covariance(cut):
         return 0.5 * information.d @ np.linalg.solve(M, K @ information.d) - 0.5 * np.linalg.slogdet(M)[1]
 
     assert gain[near] == pytest.approx(dense(with_it) - dense(others), abs=1e-4)
+    assert given.gain == pytest.approx(dense(others), abs=1e-4)
     assert likelihood(information, cut, with_it) == pytest.approx(dense(with_it), abs=1e-4)

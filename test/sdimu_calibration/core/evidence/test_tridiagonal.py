@@ -26,11 +26,11 @@ def test_gain_and_largest_eigenvalue_are_those_of_the_dense_matrix(modes, rank):
     np.testing.assert_allclose(chain.gain(variance), dense, rtol=1e-7, atol=1e-9)
 
 
-def test_the_lower_half_is_read_and_the_caller_keeps_the_matrices():
+def test_the_upper_half_is_read_and_the_caller_keeps_the_matrices():
     J, d = information(12, 12, 3)
     before = J.copy()
-    lower = np.tril(J)
-    np.testing.assert_array_equal(Tridiagonal.of(lower, d).own, Tridiagonal.of(J, d).own)
+    upper = np.triu(J)
+    np.testing.assert_array_equal(Tridiagonal.of(upper, d).own, Tridiagonal.of(J, d).own)
     np.testing.assert_array_equal(J, before)
 
 

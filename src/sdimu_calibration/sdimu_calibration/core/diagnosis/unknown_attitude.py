@@ -14,9 +14,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import InModes, Wander, given_terms
+from sdimu_calibration.core.evidence.learned_noise import InModes, Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import SENSORS
 
 _GAIN = 4.0
@@ -60,7 +60,7 @@ def _gain(wander: Wander, known: LinearEvidence, weight: Floats, beside: Sequenc
     """
     information = Joint.of(known, wander).on_wander(np.arange(len(weight)), weight)
     gains = []
-    for given in given_terms(information, wander.cut, beside).values():
-        modes = InModes.of(*given, wander.cut, ATTITUDE, 0.0)
+    for triad in TRIADS:
+        modes = InModes.of(information.of_triad(triad, beside, wander.cut), wander.cut, ATTITUDE, 0.0)
         gains += [modes.sizes_on_grid(axes)[1] for axes in SENSORS]
     return float(np.max(np.concatenate(gains), initial=0.0))

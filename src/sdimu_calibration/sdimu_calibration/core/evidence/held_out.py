@@ -11,12 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.lean import lean
 
 with lean():
-    from scipy.linalg import solve_triangular
+    from scipy.linalg import lapack, solve_triangular
 
 _LEAST_LEFT = 1e-6
 """Share (1) of a row that its own fit must leave for the prediction without it to be worked out of that fit: below, a
@@ -50,13 +50,13 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
         # Noise with a memory is predicted like a parameter of unit variance: what a stop shares with its neighbours.
         W, r = np.hstack([W, evidence.noise]), evidence.noise.shape[1]
         weight, shift = np.append(weight, np.ones(r)), np.append(shift, np.zeros(r))
-    normal = _Normal(W.T @ W, W.T @ e, weight, shift)
+    normal = _Normal(W, e, weight, shift)
     stops = np.unique(evidence.stop)
     score = np.zeros(len(stops))
     total, count = 0.0, 0
     for k, stop in enumerate(stops):
         rows = evidence.stop == stop
-        error, score[k], spread = normal.without(W[rows], e[rows])
+        error, score[k], spread = normal.without(rows)
         told = spread < evidence.unpredictable
         total += float(np.sum(error[told] ** 2 / spread[told]))
         count += int(told.sum())
@@ -65,28 +65,40 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations of k parameters on all rows, and what a part of the rows is predicted to be without it."""
+    """Normal equations of k parameters on all N rows, and what a part of the rows is predicted to be without it."""
 
-    J: Floats
-    d: Floats
+    W: Floats
+    e: Floats
     weight: Floats
     shift: Floats
 
     @cached_property
-    def root(self) -> Floats:
-        """``R`` with ``R R' = (J + weight)^-1``, shape (k, k)."""
+    def J(self) -> Floats:
+        """Information of all rows, shape (k, k)."""
+        return np.asarray(self.W.T @ self.W)
+
+    @cached_property
+    def d(self) -> Floats:
+        """Its vector with the pull of the prior means, shape (k,)."""
+        return np.asarray(self.W.T @ self.e + self.weight * self.shift)
+
+    @cached_property
+    def of_fit(self) -> tuple[Floats, Floats]:
+        """``X`` with ``X X'`` the part of each row in the fit of all (N, k), and what the fit leaves (N,)."""
         A = self.J + np.diag(self.weight)
         unit = 1.0 / np.sqrt(np.diag(A))
         L = np.linalg.cholesky(A * np.outer(unit, unit))
-        return np.asarray(solve_triangular(L, np.diag(unit), lower=True, check_finite=False).T)
+        every = np.column_stack([self.W.T * unit[:, None], self.d * unit])
+        X = solve_triangular(L, every, lower=True, check_finite=False, overwrite_b=True).T
+        return X[:-1], self.e - X[:-1] @ X[-1]
 
-    def without(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
+    def without(self, rows: Bools) -> tuple[Floats, float, Floats]:
         """Predict rows from all others.
 
         Parameters
         ----------
-        W : ndarray, shape (n, k)
-        e : ndarray, shape (n,)
+        rows : ndarray of bool, shape (N,)
+            n of them.
 
         Returns
         -------
@@ -95,22 +107,28 @@ class _Normal:
         spread : ndarray, shape (n,)
             Variance of each error.
         """
-        told = self._by_rows(W, e) if len(e) < len(self.weight) else None
-        return self._by_parameters(W, e) if told is None else told
+        told = self._by_rows(rows) if np.count_nonzero(rows) < len(self.weight) else None
+        return self._by_parameters(self.W[rows], self.e[rows]) if told is None else told
 
-    def _by_rows(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats] | None:
+    def _by_rows(self, rows: Bools) -> tuple[Floats, float, Floats] | None:
         """Work in the number of rows, from the fit to all of them; None where hardly anything else tells of a row.
 
         With H the part of the rows in their own fit, the error is ``(I - H)^-1`` times what the fit leaves, and its
         covariance ``(I - H)^-1``. Source: R. D. Cook, S. Weisberg, "Residuals and influence in regression" (1982), 2.2.
         """
-        X = W @ self.root
-        left, V = np.linalg.eigh(np.eye(len(e)) - X @ X.T)
-        if left[0] < _LEAST_LEFT:
+        X, error = self.of_fit[0][rows], self.of_fit[1][rows]
+        left = np.eye(len(X)) - X @ X.T
+        L, failed = lapack.dpotrf(left, lower=1)
+        if failed:
             return None
-        of_fit = V.T @ (e - X @ (self.root.T @ (self.d + self.weight * self.shift)))
-        log_score = -0.5 * float(np.sum(of_fit**2 / left) - np.sum(np.log(left)))
-        return V @ (of_fit / left), log_score, V**2 @ (1.0 / left)
+        root, _ = lapack.dtrtri(L, lower=1)
+        spread = np.einsum("ij,ij->j", root, root)
+        # The sum of all inverse eigenvalues is at least the largest of them.
+        if _LEAST_LEFT * spread.sum() > 1.0 and np.linalg.eigvalsh(left)[0] < _LEAST_LEFT:
+            return None
+        white = root @ error
+        log_score = -0.5 * float(white @ white) + float(np.log(np.diag(L)).sum())
+        return white @ root, log_score, spread
 
     def _by_parameters(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
         """Work in the number of parameters, from the fit to the other rows.
@@ -120,7 +138,7 @@ class _Normal:
         unit = 1.0 / np.sqrt(np.diag(self.J) + self.weight)
         A = self.J - W.T @ W + np.diag(self.weight)
         inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
-        error = e - W @ (inverse @ (self.d - W.T @ e + self.weight * self.shift))
+        error = e - W @ (inverse @ (self.d - W.T @ e))
         root = np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
         X = W @ root
         M = np.eye(len(self.weight)) + X.T @ X

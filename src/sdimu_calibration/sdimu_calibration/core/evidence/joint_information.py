@@ -13,6 +13,7 @@ from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded, spread
+from sdimu_calibration.core.evidence.taken import taken
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 
@@ -65,5 +66,5 @@ class Joint:
         q, full = len(self.evidence.names), self.information
         B = spread(full.J[:q, q:], terms, self.wander.cut)
         M, y, _ = folded(full.J[q:, q:], full.d[q:], terms, self.wander.cut)
-        X = np.linalg.solve(M, np.column_stack([B.T, y]))
-        return Information(full.J[:q, :q] - B @ X[:, :-1], full.d[:q] - B @ X[:, -1])
+        modes = taken(M, y, B)
+        return Information(full.J[:q, :q] - modes.J, full.d[:q] - modes.d)

@@ -16,8 +16,8 @@ inter-block information when block sizes are unequal", Biometrika 58 (1971).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,10 +26,20 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
-from sdimu_calibration.core.evidence.noise_root import folded, own_columns, root_of, times
+from sdimu_calibration.core.evidence.noise_root import (
+    Root,
+    folded,
+    in_modes,
+    root_of,
+    spread_in_triad,
+    times,
+    triad_roots,
+)
+from sdimu_calibration.core.evidence.taken import Taken, taken
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.evidence.tridiagonal import Tridiagonal
 from sdimu_calibration.core.noise_term import (
+    AXES,
     FLICKER,
     KINDS,
     MARKOV,
@@ -95,6 +105,8 @@ class Wander:
     """In which U is whitened, and an evidence must be that goes with it."""
     plain: Wander | None = None
     """The same in white noise, where there is an `inner`."""
+    _last: dict[Hashable, Modes] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Modes of the noise that was asked for last: a fit is taken back to it again and again."""
 
     @property
     def in_white(self) -> Wander:
@@ -172,6 +184,13 @@ class Wander:
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         """Work out independent modes of noise, those of which the data say nothing as a covariance of the means."""
+        key = tuple((t.identity, t.size) for t in terms)
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self._modes(terms)
+        return self._last[key]
+
+    def _modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         root = root_of(terms, self.cut)
         values, vectors = np.linalg.eigh(root.T @ self.square @ root)
         mean = np.einsum("s,scr->cr", self.cut.in_dwells, root.reshape(self.cut.cells, 6, -1)) @ vectors
@@ -191,8 +210,11 @@ class NoiseInformation:
     fitted: float
     """Log-likelihood that the known parameters add, with white noise alone."""
 
+    _beside: dict[str, tuple[Hashable, InTriad]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """Of each triad, what was asked for last: beside which noise of the other triad, and the answer."""
+
     def block(self, row: str, column: str) -> Floats:
-        """Cut out the information across two triads, stretch by axis.
+        """Cut out the information across two triads, axis by stretch.
 
         Returns
         -------
@@ -201,11 +223,11 @@ class NoiseInformation:
         """
         n = len(self.d) // 6
         a, b = 3 * TRIADS.index(row), 3 * TRIADS.index(column)
-        cut = self.J.reshape(n, 6, n, 6)[:, a : a + 3, :, b : b + 3]
+        cut = self.J.reshape(n, 6, n, 6)[:, a : a + 3, :, b : b + 3].transpose(1, 0, 3, 2)
         return np.ascontiguousarray(cut).reshape(3 * n, 3 * n)
 
     def part(self, triad: str) -> Floats:
-        """Cut out the information vector of a triad.
+        """Cut out the information vector of a triad, axis by stretch.
 
         Returns
         -------
@@ -213,7 +235,52 @@ class NoiseInformation:
             Inverse units (SI) of the errors.
         """
         first = 3 * TRIADS.index(triad)
-        return np.ascontiguousarray(self.d.reshape(-1, 6)[:, first : first + 3]).ravel()
+        return np.ascontiguousarray(self.d.reshape(-1, 6)[:, first : first + 3].T).ravel()
+
+    def gain(self, terms: Sequence[NoiseTerm], cut: Stretches) -> float:
+        """Log-likelihood (1) of noise terms over that of white noise."""
+        M, y, _ = folded(self.J, self.d, terms, cut)
+        return taken(M, y, np.zeros((0, len(y)))).gain
+
+    def of_triad(self, triad: str, terms: Sequence[NoiseTerm], cut: Stretches) -> InTriad:
+        """Information on the wander of a triad, that of some terms in the model.
+
+        Parameters
+        ----------
+        terms : sequence of NoiseTerm
+            With their sizes.
+        """
+        other = TRIADS[1 - TRIADS.index(triad)]
+        others = [t for t in terms if t.triad == other]
+        key = tuple((t.identity, t.size) for t in others)
+        if triad not in self._beside or self._beside[triad][0] != key:
+            alone = InTriad(self.block(triad, triad), self.part(triad))
+            roots = triad_roots(others, cut, other)
+            if roots:
+                across = spread_in_triad(self.block(triad, other), roots)
+                alone = alone.less(taken(*in_modes(self.block(other, other), self.part(other), roots)[:2], across))
+            self._beside[triad] = key, alone
+        return self._beside[triad][1].beside(triad_roots(terms, cut, triad))
+
+
+@dataclass(frozen=True)
+class InTriad:
+    """Information on the wander of a triad of sensors in n cells, axis by cell."""
+
+    J: Floats
+    """In inverse squares of the units (SI) of the errors, shape (3 n, 3 n)."""
+    d: Floats
+    """In inverse units, shape (3 n,)."""
+    gain: float = 0.0
+    """Log-likelihood (1) of the noise that is in the model, over that of white noise."""
+
+    def beside(self, roots: Sequence[Root]) -> InTriad:
+        """Put noise of the triad itself into the model."""
+        return self.less(taken(*in_modes(self.J, self.d, roots))) if roots else self
+
+    def less(self, taken: Taken) -> InTriad:
+        """Leave out what modes take."""
+        return InTriad(self.J - taken.J, self.d - taken.d, self.gain + taken.gain)
 
 
 def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTerm] = ()) -> tuple[NoiseTerm, ...]:
@@ -233,11 +300,12 @@ def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTe
             likeliest = max(seen.values(), key=lambda some: likelihood(information, cut, some))
             return _tuned(information, cut, likeliest)
         seen[which] = terms
-        given = given_terms(information, cut, terms)
         options = [
             size
             for triad in TRIADS
-            for size in _best_sizes(*given[triad], cut, [t for t in tried if t.triad == triad and _room(terms, t)])
+            for size in _best_sizes(
+                information.of_triad(triad, terms, cut), cut, [t for t in tried if t.triad == triad and _room(terms, t)]
+            )
         ]
         best = max(options, key=lambda t: t.gain, default=None)
         if best is None or best.gain < LEAST_GAIN:
@@ -251,9 +319,9 @@ def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseT
     for place, term in enumerate(terms):
         if not term.tau:
             continue
-        given = given_terms(information, cut, [t for t in out if t is not term], [term.triad])[term.triad]
+        given = information.of_triad(term.triad, [t for t in out if t is not term], cut)
         tried = [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING]
-        near = _best_sizes(*given, cut, tried)
+        near = _best_sizes(given, cut, tried)
         best = max(near, key=lambda t: t.gain)
         likely = [t for t in near if t.gain > best.gain - _INTERVAL]
         out[place] = replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
@@ -264,9 +332,9 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     """Say of each term which kinds in its place are as likely, within odds of 20 to 1."""
     out = []
     for term in terms:
-        given = given_terms(information, cut, [t for t in terms if t is not term], [term.triad])[term.triad]
+        given = information.of_triad(term.triad, [t for t in terms if t is not term], cut)
         tried = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
-        others = _best_sizes(*given, cut, tried)
+        others = _best_sizes(given, cut, tried)
         near = {t.kind for t in others if t.gain > term.gain - INDISTINGUISHABLE}
         out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
     return tuple(out)
@@ -315,26 +383,22 @@ def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[No
     """Log-likelihood of the known parameters and the noise terms, against no parameters and white noise."""
     if not terms:
         return information.fitted
-    M, y, _ = folded(information.J, information.d, terms, cut)
-    # The last row of the factor of M with y as one more row is L^-1 y, which is no longer than y.
-    L = np.linalg.cholesky(np.block([[M, y[:, None]], [y, 2.0 * y @ y + 1.0]]))
-    z = L[-1, :-1]
-    return information.fitted + 0.5 * float(z @ z) - float(np.sum(np.log(np.diag(L)[:-1])))
+    return information.fitted + information.gain(terms, cut)
 
 
 def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
     """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
-    return _best_size(*given_terms(information, cut, others, [term.triad])[term.triad], cut, term)
+    return _best_size(information.of_triad(term.triad, others, cut), cut, term)
 
 
-def _best_sizes(J: Floats, d: Floats, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:
+def _best_sizes(given: InTriad, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:
     """Best size of each of some terms alone."""
-    return side_by_side(lambda term: _best_size(J, d, cut, term), terms)
+    return side_by_side(lambda term: _best_size(given, cut, term), terms)
 
 
-def _best_size(J: Floats, d: Floats, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
-    """Best size of a term, J (3 n, 3 n) and d (3 n,) the information on the wander of its triad."""
-    modes = InModes.of(J, d, cut, term.kind, term.tau).in_sensors(term.axes)
+def _best_size(given: InTriad, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
+    """Best size of a term of a triad."""
+    modes = InModes.of(given, cut, term.kind, term.tau).in_sensors(term.axes)
     variance = _grid(modes)
     if not len(variance):
         return replace(term, size=0.0, low=0.0, high=0.0, gain=0.0)
@@ -361,29 +425,26 @@ class InModes:
     """Information on the modes of a kind of noise of unit size, r of them, in each sensor of a triad."""
 
     J: Floats
-    """Mode by axis (1), shape (3 r, 3 r)."""
+    """Its upper half, axis by mode (1), shape (3 r, 3 r)."""
     d: Floats
     """(1), shape (3 r,)."""
 
     @classmethod
-    def of(cls, J: Floats, d: Floats, cut: Stretches, kind: str, tau: float) -> InModes:
-        """Take it from the information on the wander of a triad.
-
-        Parameters
-        ----------
-        J : ndarray, shape (3 n, 3 n)
-            As of `given_terms`, inverse squares of the units (SI) of the errors.
-        d : ndarray, shape (3 n,)
-            Inverse units.
-        """
+    def of(cls, given: InTriad, cut: Stretches, kind: str, tau: float) -> InModes:
+        """Take it from the information on the wander of a triad."""
         root = cut.mode(kind, tau)
-        every = np.arange(3 * root.shape[1])
-        half = np.ascontiguousarray(times(J, root, every).T)
-        return cls(times(half, root, every), (root.T @ d.reshape(-1, 3)).ravel())
+        n, r = root.shape
+        J = np.zeros((len(AXES) * r, len(AXES) * r))
+        for a in AXES:
+            across = (root.T @ given.J[a * n : (a + 1) * n, a * n :]).reshape(-1, n)
+            J[a * r : (a + 1) * r, a * r :] = (across @ root).reshape(r, -1)
+        return cls(J, times(given.d[None], root, AXES)[0])
 
     def in_sensors(self, axes: Sequence[int]) -> Tridiagonal:
         """Information on the modes of some sensors alone."""
-        own = own_columns(axes, len(self.d) // 3)
+        if len(axes) == len(AXES):
+            return Tridiagonal.of(self.J, self.d)
+        own = np.arange(len(self.d)).reshape(len(AXES), -1)[list(axes)].ravel()
         return Tridiagonal.of(self.J[np.ix_(own, own)], self.d[own])
 
     def sizes_on_grid(self, axes: Sequence[int]) -> tuple[Floats, Floats]:
@@ -405,34 +466,3 @@ def _grid(modes: Tridiagonal) -> Floats:
     """Variances of noise that are tried first (v,); empty where the data say nothing of the modes."""
     largest = modes.largest if len(modes.own) else 0.0
     return _GRID / largest if largest > 0.0 else np.empty(0)
-
-
-def given_terms(
-    information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm], triads: Iterable[str] = TRIADS
-) -> dict[str, tuple[Floats, Floats]]:
-    """Information on further wander of triads when that of some terms is in the model.
-
-    Parameters
-    ----------
-    cut : Stretches
-        n stretches.
-    terms : sequence of NoiseTerm
-        With their sizes.
-
-    Returns
-    -------
-    dict of str to (ndarray of shape (3 n, 3 n), ndarray of shape (3 n,))
-        Of each triad: information in inverse squares of the units (SI) of the errors, and its vector in inverse units.
-    """
-    out = {triad: (information.block(triad, triad), information.part(triad)) for triad in triads}
-    if not out or not any(t.size > 0.0 for t in terms):
-        return out
-    M, y, across = folded(information.J, information.d, terms, cut)
-    rows = across.reshape(cut.cells, 2, 3, len(y))
-    B = {triad: np.ascontiguousarray(rows[:, TRIADS.index(triad)]).reshape(-1, len(y)) for triad in out}
-    X = np.linalg.solve(M, np.column_stack([*(each.T for each in B.values()), y]))
-    parts = np.split(X[:, :-1], len(out), axis=1)
-    return {
-        triad: (J - B[triad] @ part, d - B[triad] @ X[:, -1])
-        for (triad, (J, d)), part in zip(out.items(), parts, strict=True)
-    }

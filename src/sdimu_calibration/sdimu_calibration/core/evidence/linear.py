@@ -23,6 +23,7 @@ from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
+from sdimu_calibration.core.evidence.taken import divided, factor
 from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -170,8 +171,13 @@ class LinearEvidence(ABC):
         """
         if not self.noise.size:
             return columns
-        M = np.eye(self.noise.shape[1]) + self.noise.T @ self.noise
-        return np.asarray(columns - self.noise @ np.linalg.solve(M, self.noise.T @ columns))
+        Z = divided(self._noise_factor, columns.T @ self.noise)
+        return np.asarray(columns - self.noise @ divided(self._noise_factor, Z.T, turned=True))
+
+    @cached_property
+    def _noise_factor(self) -> Floats:
+        """Cholesky factor of the information on the modes of the noise, shape (r, r)."""
+        return factor(np.eye(self.noise.shape[1]) + self.noise.T @ self.noise)
 
     def with_noise(self: E, modes: Floats, worked_out: Information | None = None) -> E:
         """Return the evidence with other modes of noise with a memory.

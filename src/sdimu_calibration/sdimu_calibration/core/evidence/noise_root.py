@@ -1,18 +1,23 @@
 """Square root of the covariance of the errors that noise with a memory makes in each stretch of a test.
 
 Each sensor of a term draws its own error from one kernel, so a root is that of one sensor (n cells by r modes) for each
-of the sensors that the term is of; columns come triad by triad, of a triad mode by mode, of a mode axis by axis.
+of the sensors that the term is of. Terms of the same sensors have one root together, of no more modes than cells: only
+what follows something is told apart afterwards. Columns come triad by triad, of a triad root by root, of a root axis by
+axis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import FOLLOWS, TRIADS, NoiseTerm
+
+Root = tuple[Floats, tuple[int, ...]]
+"""Modes of noise for one sensor (SI), shape (n, r) of n cells, and the axes of the sensors that have it."""
 
 
 def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
@@ -23,13 +28,13 @@ def root_of(terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
     ndarray, shape (6 n, r)
         SI.
     """
-    parts = []
+    parts = [np.zeros((6 * cut.cells, 0))]
     for first, triad in zip((0, 3), TRIADS, strict=True):
-        root, own = triad_root(terms, cut, triad)
-        every = np.zeros((cut.cells, 6, root.shape[1], 3))
-        for axis in range(3):
-            every[:, first + axis, :, axis] = root
-        parts.append(every.reshape(6 * cut.cells, -1)[:, own])
+        for root, axes in triad_roots(terms, cut, triad):
+            every = np.zeros((cut.cells, 6, len(axes), root.shape[1]))
+            for place, axis in enumerate(axes):
+                every[:, first + axis, place] = root
+            parts.append(every.reshape(6 * cut.cells, -1))
     return np.hstack(parts)
 
 
@@ -39,75 +44,113 @@ def columns_of(terms: Sequence[NoiseTerm], cut: Stretches) -> list[Ints]:
     Returns
     -------
     list of ndarray of int, shape (k,) each
-        None of a term of no size.
+        Terms of one root share them; none of a term of no size.
     """
-    begin, out = 0, dict[int, Ints]()
+    begin, out = 0, [np.zeros(0, dtype=np.int64) for _ in terms]
     for triad in TRIADS:
-        for k, term in enumerate(terms):
-            if term.triad == triad:
-                size = len(term.axes) * cut.mode(term.kind, term.tau).shape[1] if term.size > 0.0 else 0
+        for group, (root, axes) in zip(_groups(terms, triad), triad_roots(terms, cut, triad), strict=True):
+            size = len(axes) * root.shape[1]
+            for k in group:
                 out[k] = np.arange(begin, begin + size)
-                begin += size
-    return [out[k] for k in range(len(terms))]
+            begin += size
+    return out
 
 
-def triad_root(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> tuple[Floats, Ints]:
-    """Square root of the covariance of the terms of a triad.
-
-    Returns
-    -------
-    root : ndarray, shape (n, r)
-        Modes of the terms for a sensor that has all of them, of n cells.
-    own : ndarray of int, shape (k,)
-        Those of the 3 r columns, mode by axis, that a sensor has which a term is of.
-    """
-    of_triad = [t for t in terms if t.triad == triad and t.size > 0.0]
-    roots = [t.size * cut.mode(t.kind, t.tau) for t in of_triad]
-    if not roots:
-        return np.zeros((cut.cells, 0)), np.zeros(0, dtype=np.int64)
-    own, begin = [], 0
-    for term, root in zip(of_triad, roots, strict=True):
-        own.append(begin + own_columns(term.axes, root.shape[1]))
-        begin += 3 * root.shape[1]
-    return np.hstack(roots), np.concatenate(own)
+def _groups(terms: Sequence[NoiseTerm], triad: str) -> list[list[int]]:
+    """Places of the terms of a triad that have one root: those of the same sensors that follow nothing."""
+    out: dict[Hashable, list[int]] = {}
+    for k, term in enumerate(terms):
+        if term.triad == triad and term.size > 0.0:
+            out.setdefault(term.identity if term.kind in FOLLOWS else term.axes, []).append(k)
+    return list(out.values())
 
 
-def own_columns(axes: Sequence[int], modes: int) -> Ints:
-    """Columns of some sensors, among those of three.
-
-    Parameters
-    ----------
-    modes : int
-        r modes of the term.
+def triad_roots(terms: Sequence[NoiseTerm], cut: Stretches, triad: str) -> list[Root]:
+    """Square roots of the covariance of the terms of a triad.
 
     Returns
     -------
-    ndarray of int, shape (k,)
-        Among 3 r, mode by axis.
+    list of Root
     """
-    return np.asarray((3 * np.arange(modes)[:, None] + np.array(axes)).ravel())
+    out = []
+    for group in _groups(terms, triad):
+        roots = [terms[k].size * cut.mode(terms[k].kind, terms[k].tau) for k in group]
+        out.append((roots[0] if len(roots) == 1 else _together(roots, len(cut)), terms[group[0]].axes))
+    return out
 
 
-def times(J: Floats, root: Floats, own: Ints) -> Floats:
-    """Spread the columns of a matrix over modes, ``J (root x I3)``.
+def _together(roots: Sequence[Floats], n: int) -> Floats:
+    """Square root of the sum of the covariances of several roots, which are zero behind n stretches."""
+    every = np.hstack(roots)
+    if every.shape[1] <= n:
+        return every
+    out = np.zeros((len(every), n))
+    out[:n] = np.transpose(np.linalg.qr(every[:n].T, mode="r"))
+    return out
+
+
+def times(J: Floats, root: Floats, axes: Sequence[int]) -> Floats:
+    """Spread the columns of a matrix over modes of some sensors, ``J (I3 x root)``.
 
     Parameters
     ----------
     J : ndarray, shape (m, 3 n)
-        Any unit; its columns are those of three sensors in n cells.
+        Any unit; its columns are those of three sensors in n cells, axis by cell.
     root : ndarray, shape (n, r)
         Modes for one sensor (SI).
-    own : ndarray of int, shape (k,)
-        Columns of the result that are wanted, among 3 r.
+    axes : sequence of int, length a
+        Sensors that are wanted.
 
     Returns
     -------
-    ndarray, shape (m, k)
-        In the unit of J times SI.
+    ndarray, shape (m, a r)
+        In the unit of J times SI; axis by mode.
     """
     n, r = root.shape
-    every = np.tensordot(J.reshape(-1, n, 3), root, axes=(1, 0)).transpose(0, 2, 1).reshape(len(J), 3 * r)
-    return np.ascontiguousarray(every if len(own) == 3 * r else every[:, own])
+    own = J.reshape(len(J), 3, n)
+    own = own if len(axes) == 3 else own[:, list(axes)]
+    return np.asarray((own.reshape(-1, n) @ root).reshape(len(J), len(axes) * r))
+
+
+def spread_in_triad(J: Floats, roots: Sequence[Root]) -> Floats:
+    """Spread the columns of a matrix over the modes of a triad, root by root.
+
+    Parameters
+    ----------
+    J : ndarray, shape (m, 3 n)
+        Any unit; as of `times`.
+
+    Returns
+    -------
+    ndarray, shape (m, r)
+        In the unit of J times SI.
+    """
+    parts = [times(J, *one) for one in roots]
+    return parts[0] if len(parts) == 1 else np.hstack([np.zeros((len(J), 0)), *parts])
+
+
+def in_modes(J: Floats, d: Floats, roots: Sequence[Root]) -> tuple[Floats, Floats, Floats]:
+    """Information on the modes of a triad, with what is known of them before the data.
+
+    Parameters
+    ----------
+    J : ndarray, shape (3 n, 3 n)
+        Information on the mean errors of its sensors, axis by cell, inverse squares of their units (SI).
+    d : ndarray, shape (3 n,)
+
+    Returns
+    -------
+    M : ndarray, shape (r, r)
+        ``I + R'JR`` (1).
+    y : ndarray, shape (r,)
+        ``R'd`` (1).
+    across : ndarray, shape (3 n, r)
+        ``JR``, inverse units (SI) of the errors.
+    """
+    across = spread_in_triad(J, roots)
+    M = spread_in_triad(np.ascontiguousarray(across.T), roots)
+    M[np.diag_indices_from(M)] += 1.0
+    return M, spread_in_triad(d[None], roots)[0], across
 
 
 def spread(J: Floats, terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
@@ -124,12 +167,10 @@ def spread(J: Floats, terms: Sequence[NoiseTerm], cut: Stretches) -> Floats:
         (1).
     """
     parts = J.reshape(len(J), cut.cells, 2, 3)
-    out = [np.zeros((len(J), 0))]
-    for k, triad in enumerate(TRIADS):
-        root, own = triad_root(terms, cut, triad)
-        if len(own):
-            out.append(times(np.ascontiguousarray(parts[:, :, k]).reshape(len(J), -1), root, own))
-    return np.hstack(out)
+    of_triads = [np.ascontiguousarray(parts[:, :, k].transpose(0, 2, 1)).reshape(len(J), -1) for k in range(2)]
+    return np.hstack(
+        [spread_in_triad(own, triad_roots(terms, cut, triad)) for own, triad in zip(of_triads, TRIADS, strict=True)]
+    )
 
 
 def folded(J: Floats, d: Floats, terms: Sequence[NoiseTerm], cut: Stretches) -> tuple[Floats, Floats, Floats]:

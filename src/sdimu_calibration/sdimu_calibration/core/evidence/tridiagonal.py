@@ -43,17 +43,17 @@ class Tridiagonal:
         Parameters
         ----------
         J : ndarray, shape (m, m)
-            Its lower half is read (1).
+            Its upper half is read (1).
         d : ndarray, shape (m,)
             (1).
         """
         from scipy.linalg.lapack import dsytrd  # noqa: PLC0415 (0.1 s that a calibration in white noise does not need)
 
         m = len(d)
-        # With the vector as a column before it, the reduction begins at the vector.
-        bordered = np.zeros((m + 1, m + 1), order="F")
-        bordered[1:, 1:], bordered[1:, 0] = J, d
-        _, own, beside, _, _ = dsytrd(bordered, lower=1, lwork=_WORK * (m + 1), overwrite_a=1)
+        # With the vector as a row before it, the reduction begins at the vector; LAPACK reads columns for rows.
+        bordered = np.zeros((m + 1, m + 1))
+        bordered[1:, 1:], bordered[0, 1:] = J, d
+        _, own, beside, _, _ = dsytrd(bordered.T, lower=1, lwork=_WORK * (m + 1), overwrite_a=1)
         return cls(own[1:], beside[1:], float(d @ d))
 
     @property

@@ -17,6 +17,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded
+from sdimu_calibration.core.evidence.taken import taken
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -125,4 +126,5 @@ def _taken(joint: Joint, noise: NoiseModel) -> tuple[float, float]:
         return 0.0, 0.0
     q, full = len(joint.evidence.names), joint.information
     M, y, _ = folded(full.J[q:, q:], full.d[q:], noise.terms, joint.wander.cut)
-    return float(np.linalg.slogdet(M)[1]), float(y @ np.linalg.solve(M, y))
+    modes = taken(M, y, np.zeros((0, len(y))))
+    return 2.0 * float(np.log(np.diag(modes.L)).sum()), float(modes.z @ modes.z)

@@ -13,6 +13,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
@@ -189,8 +190,7 @@ class SetBoard(Board[SetEvidence]):
         """Work out the information in a noise as its model states it."""
         evidence, one = self.evidence, self._total(self._chosen(noise), self.keep)
         one.d[: len(evidence.weight)] += evidence.weight * evidence.shift
-        none = np.zeros((0, 0))
-        return InNoise(one.J, one.d, none, np.zeros((0, len(one.d))), np.zeros(0), none)
+        return InNoise(one.J, one.d, np.zeros((0, 0)), nothing_taken(len(one.d)))
 
     def likelihood(self, noise: NoiseModel) -> float:
         """Log likelihood (1) of no effect in a noise, over that in white noise."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic
 
@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, likelihood
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.noise_root import folded, root_of, spread
+from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken, taken
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains
@@ -34,17 +35,13 @@ class InNoise:
     """Information on p coefficients and u candidates in a noise of r modes, and what they say of the modes."""
 
     J: Floats
-    """Shape (p + u, p + u)."""
+    """Inverse squares of the units (SI) of the parameters, shape (p + u, p + u)."""
     d: Floats
-    """Without the pull of the white residuals that the modes take, shape (p + u,)."""
+    """Inverse units, without the pull of the white residuals that the modes take, shape (p + u,)."""
     R: Floats
-    """Mean errors in all stretches of each mode, shape (6 n, r)."""
-    X: Floats
-    """Modes that one unit of each parameter takes the place of, shape (r, p + u)."""
-    u: Floats
-    """Modes with all parameters at zero, shape (r,)."""
-    inverse: Floats
-    """Their covariance with the parameters known, shape (r, r)."""
+    """Mean errors in all stretches of each mode (SI), shape (6 n, r)."""
+    modes: Taken
+    """What the modes take of the information on the parameters in white noise."""
 
 
 class Board(Generic[E]):
@@ -122,9 +119,7 @@ class Board(Generic[E]):
     def squares(self, noise: NoiseModel) -> tuple[float, int]:
         """Sum of the squared residuals with no effect added, in a noise (1), and their number."""
         e, one = self.evidence.e, self.as_stated.in_noise(noise)
-        # The modes take y' M^-1 y of the square sum: u = M^-1 y, and `inverse` is M^-1.
-        modes = float(one.u @ np.linalg.solve(one.inverse, one.u)) if one.u.size else 0.0
-        return float(e @ e) - modes, len(e)
+        return float(e @ e) - float(one.modes.z @ one.modes.z), len(e)
 
     @cached_property
     def _nothing(self) -> NoiseInformation:
@@ -218,21 +213,21 @@ class Board(Generic[E]):
         pull = np.zeros(len(one.d))
         pull[: len(evidence.weight)] = evidence.weight * evidence.shift
         d = (one.d - pull) / self.excess + pull
-        return replace(one, J=one.J / self.excess, d=d, inverse=one.inverse * self.excess)
+        root = np.sqrt(self.excess)
+        modes = Taken(one.modes.L / root, one.modes.Z / root, one.modes.z / root)
+        return InNoise(one.J / self.excess, d, one.R, modes)
 
     def worked_out(self, noise: NoiseModel) -> InNoise:
         """Work out the information in a noise as its model states it."""
         keep, full = self.keep, self.evidence.information
         J, d = full.J[np.ix_(keep, keep)], full.d[keep]
         if not noise.terms or self.joint is None or self.wander is None:
-            return InNoise(J, d, np.zeros((0, 0)), np.zeros((0, len(keep))), np.zeros(0), np.zeros((0, 0)))
+            return InNoise(J, d, np.zeros((0, 0)), nothing_taken(len(keep)))
         joint, n = self.joint.information, len(self.evidence.names)
         cut = self.wander.cut
-        B = spread(joint.J[keep, n:], noise.terms, cut).T
         M, y, _ = folded(joint.J[n:, n:], joint.d[n:], noise.terms, cut)
-        inverse: Floats = np.asarray(np.linalg.inv(M))
-        X = inverse @ B
-        return InNoise(J - B.T @ X, d - X.T @ y, root_of(noise.terms, cut), X, inverse @ y, inverse)
+        modes = taken(M, y, spread(joint.J[keep, n:], noise.terms, cut))
+        return InNoise(J - modes.J, d - modes.d, root_of(noise.terms, cut), modes)
 
     def data(self, noise: NoiseModel) -> tuple[float, Data]:
         """Log posterior of no effect in a noise, over that in white noise; and the candidates in it."""
@@ -335,13 +330,13 @@ class Board(Generic[E]):
         d : ndarray, shape (n,)
             Pull of each (1/SI).
         """
-        one, evidence = self.in_noise(noise), self.evidence
+        # The modes are as stated: an excess makes all smaller by the same factor.
+        one, evidence = self.as_stated.in_noise(noise), self.evidence
         own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
         if noise.terms and self.wander is not None:
-            B = (self.wander.across(W) if on_wander is None else on_wander) @ one.R
-            # The modes are as stated, and so are these: an excess makes all smaller by the same factor.
-            own = own - np.einsum("ir,ir->i", B @ (one.inverse / self.excess), B)
-            across, d = across - B @ one.X[:, at], d - B @ one.u
+            B = divided(one.modes.L, (self.wander.across(W) if on_wander is None else on_wander) @ one.R)
+            own = own - np.einsum("ri,ri->i", B, B)
+            across, d = across - B.T @ one.modes.Z[:, at], d - one.modes.z @ B
         return own / self.excess, across / self.excess, d / self.excess
 
 

@@ -26,6 +26,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.taken import divided
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -173,7 +174,8 @@ class Averages:
             else:
                 cut = wander.cut
                 G = np.einsum("s,scr->cr", cut.in_dwells, one.R.reshape(cut.cells, 6, -1))
-                self._noises[noise] = _Mean(G @ one.X, G @ one.u, G @ one.inverse @ G.T)
+                H = divided(one.modes.L, G)
+                self._noises[noise] = _Mean(H.T @ one.modes.Z, H.T @ one.modes.z, H.T @ H)
         return self._noises[noise]
 
 

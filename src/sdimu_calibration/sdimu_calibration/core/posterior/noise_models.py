@@ -14,7 +14,7 @@ from itertools import chain, combinations, product, repeat
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, given_terms, kinds, likelihood
+from sdimu_calibration.core.evidence.learned_noise import InModes, InTriad, NoiseInformation, kinds
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import (
     AXES,
@@ -200,21 +200,19 @@ class _Search:
             own = _of_triad(NoiseModel(terms), term.triad)
             if len(own) < _MOST_TERMS and not _is_in(term, own):
                 room.append(term)
-        given = given_terms(
-            self.information, self.cut, terms, [name for name in TRIADS if any(t.triad == name for t in room)]
-        )
+        given = {name: self.information.of_triad(name, terms, self.cut) for name in {t.triad for t in room}}
         alike: dict[tuple[str, str, float], list[NoiseTerm]] = {}
         for term in room:
             alike.setdefault(term.identity[:3], []).append(term)
-        sized = side_by_side(lambda own: self._in_sensors(*given[own[0].triad], own), alike.values())
+        sized = side_by_side(lambda own: self._in_sensors(given[own[0].triad], own), alike.values())
         return [
             self.keep(_Found(NoiseModel((*terms, term), base.noise.log_prior + share), base.gain + term.gain))
             for term, share in chain.from_iterable(sized)
         ]
 
-    def _in_sensors(self, J: Floats, d: Floats, terms: Sequence[NoiseTerm]) -> list[tuple[NoiseTerm, float]]:
+    def _in_sensors(self, given: InTriad, terms: Sequence[NoiseTerm]) -> list[tuple[NoiseTerm, float]]:
         """Best sizes of one kind of noise in each choice of sensors; a sensor that alone has none is in no choice."""
-        modes = InModes.of(J, d, self.cut, terms[0].kind, terms[0].tau)
+        modes = InModes.of(given, self.cut, terms[0].kind, terms[0].tau)
         out, without = [], set[int]()
         for term in sorted(terms, key=lambda t: len(t.axes)):
             if without & set(term.axes):
@@ -272,26 +270,25 @@ class _Search:
 
     def _sized_in_turn(self, terms: Sequence[NoiseTerm]) -> _Found:
         """Take the best size of each term beside the others, once."""
+        gain = 0.0
         sized: dict[int, tuple[NoiseTerm, float]] = {k: (term, 0.0) for k, term in enumerate(terms)}
         for place in list(sized):
             others = [found[0] for k, found in sized.items() if k != place]
             term = sized[place][0]
-            given = given_terms(self.information, self.cut, others, [term.triad])[term.triad]
-            again = self.sized(InModes.of(*given, self.cut, term.kind, term.tau), term)
+            given = self.information.of_triad(term.triad, others, self.cut)
+            again = self.sized(InModes.of(given, self.cut, term.kind, term.tau), term)
+            gain = given.gain
             if again is None:
                 del sized[place]
             else:
                 sized[place] = again
+                gain += again[0].gain
         noise = NoiseModel(tuple(found[0] for found in sized.values()), sum(found[1] for found in sized.values()))
-        gain = noise.terms[0].gain if len(noise.terms) == 1 else self._likelihood(noise)
         return _Found(noise, gain)
 
     def best(self) -> _Found:
         """Give the likeliest noise so far."""
         return max(self.seen.values(), key=lambda found: found.score)
-
-    def _likelihood(self, noise: NoiseModel) -> float:
-        return likelihood(self.information, self.cut, noise.terms) - self.information.fitted
 
 
 def _is_in(term: NoiseTerm, terms: Sequence[NoiseTerm]) -> bool:

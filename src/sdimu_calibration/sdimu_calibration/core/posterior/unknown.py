@@ -11,6 +11,7 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.noise_root import columns_of
+from sdimu_calibration.core.evidence.taken import divided
 from sdimu_calibration.core.noise_term import ATTITUDE, AXES, FOLLOWS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import Posterior
@@ -55,9 +56,11 @@ def unknown_functions(found: Posterior[E], terms: Sequence[NoiseTerm]) -> tuple[
     members = found.told.members
     at = np.array([*range(p), *(p + k for k, _ in members)], dtype=np.int64)
     covariance = solved(one.J[np.ix_(at, at)] + np.diag(board.parameters(members)[1]), np.eye(len(at)))
-    X = one.X[:, at]
-    mode = one.u - X @ (covariance @ one.d[at])
-    spread = one.inverse + X @ covariance @ X.T
+    of_modes = divided(one.modes.L, np.column_stack([one.modes.Z[:, at], one.modes.z]).T, turned=True)
+    X = of_modes[:, :-1]
+    mode = of_modes[:, -1] - X @ (covariance @ one.d[at])
+    root = divided(one.modes.L, np.eye(len(mode)))
+    spread = root.T @ root + X @ covariance @ X.T
     share = cut.in_dwells[: len(cut)]
     out = []
     for term, columns in zip(terms, columns_of(terms, cut), strict=True):
