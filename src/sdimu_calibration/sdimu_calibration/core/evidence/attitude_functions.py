@@ -15,7 +15,7 @@ Res. 2 (2001) (knots by incomplete Cholesky decomposition).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,15 +66,23 @@ class AttitudeFunctions:
 
     def effects(self) -> list[Effect]:
         """Give every sensor an error that is a sum of the functions; six parameters a function, in their order."""
-        return [self._effect(range(k, min(k + _BLOCK, len(self)))) for k in range(0, len(self), _BLOCK)]
+        last: list[tuple[Motion, Floats]] = []
 
-    def _effect(self, numbers: range) -> Effect:
+        def at(motion: Motion) -> Floats:
+            if not last or last[0][0] is not motion:
+                # All effects are asked about one motion, one after the other.
+                last[:] = [(motion, self.at(directions(motion)))]
+            return last[0][1]
+
+        return [self._effect(range(k, min(k + _BLOCK, len(self))), at) for k in range(0, len(self), _BLOCK)]
+
+    def _effect(self, numbers: range, at: Callable[[Motion], Floats]) -> Effect:
         units = [("rad/s", "deg/h") if k < 3 else ("m/s^2", "ug") for k in range(len(CHANNELS))]
         label = f"functions of the attitude from {numbers.start}"
         count = len(numbers) * len(CHANNELS)
 
         def values(motion: Motion) -> Floats:
-            return self.at(directions(motion))[:, numbers.start : numbers.stop].repeat(len(CHANNELS), axis=1)
+            return at(motion)[:, numbers.start : numbers.stop].repeat(len(CHANNELS), axis=1)
 
         return Effect(
             name=label,

@@ -18,7 +18,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 
-_WORK = 32
+_WORK = 64
 """Numbers (1) of work space for each row: the block in which LAPACK reduces a symmetric matrix."""
 
 _HALVINGS = 40

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.motion import Motion
@@ -63,8 +64,9 @@ def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: 
 
 def _crossed(U: Floats, product: Floats) -> Floats:
     """Cross products of vectors that go through `U` (n, 3, 3): the products (n, 3) go through its cofactors."""
-    cofactor = np.linalg.det(U)[:, None, None] * np.linalg.inv(U).transpose(0, 2, 1)
-    return np.asarray(np.einsum("kij,kj->ki", cofactor, product))
+    rows = U.transpose(1, 0, 2)
+    cofactor = [np.cross(rows[(k + 1) % 3], rows[(k + 2) % 3]) for k in range(3)]
+    return np.column_stack([np.einsum("kj,kj->k", row, product) for row in cofactor])
 
 
 def spread(values: Floats, channel: Ints, parameter: Ints, weight: Floats) -> tuple[Floats, Ints, Ints]:
@@ -84,18 +86,16 @@ def spread(values: Floats, channel: Ints, parameter: Ints, weight: Floats) -> tu
     values : ndarray, shape (n, m')
     channel, parameter : ndarray of int, shape (m',)
     """
-    columns: list[Floats] = []
-    channels: list[int] = []
-    parameters: list[int] = []
-    for column, (source, owner) in enumerate(zip(channel, parameter, strict=True)):
-        for target in range(6):
-            share = weight[:, target, source]
-            if share.any():
-                columns.append(share * values[:, column])
-                channels.append(target)
-                parameters.append(int(owner))
-    return (
-        np.ascontiguousarray(np.column_stack(columns)),
-        np.array(channels, np.int64),
-        np.array(parameters, np.int64),
-    )
+    columns, targets = np.nonzero(np.any(weight, axis=0).T[channel])
+    spread_values = _weighed(np.ascontiguousarray(values), columns, channel[columns], targets, weight)
+    return spread_values, targets.astype(np.int64), parameter[columns].astype(np.int64)
+
+
+@compiled
+def _weighed(values: Floats, columns: Ints, source: Ints, target: Ints, weight: Floats) -> Floats:
+    """Columns of regressors (n, m), each times an element of the weights (n, 6, 6); shape (n, m')."""
+    out = np.empty((values.shape[0], columns.shape[0]))
+    for k in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[k, j] = weight[k, target[j], source[j]] * values[k, columns[j]]
+    return out
