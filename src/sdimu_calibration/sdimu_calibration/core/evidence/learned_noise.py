@@ -437,7 +437,7 @@ class InModes:
         J = np.zeros((len(AXES) * r, len(AXES) * r))
         for a in AXES:
             across = (root.T @ given.J[a * n : (a + 1) * n, a * n :]).reshape(-1, n)
-            J[a * r : (a + 1) * r, a * r :] = (across @ root).reshape(r, -1)
+            J[a * r : (a + 1) * r, a * r :] = (across @ root).reshape(r, (len(AXES) - a) * r)
         return cls(J, times(given.d[None], root, AXES)[0])
 
     def in_sensors(self, axes: Sequence[int]) -> Tridiagonal:

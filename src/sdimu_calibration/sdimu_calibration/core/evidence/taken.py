@@ -87,6 +87,8 @@ def factor(M: Floats) -> Floats:
     ndarray, shape (r, r)
         (1).
     """
+    if not M.size:
+        return M
     from scipy.linalg import lapack  # noqa: PLC0415 (0.1 s that a calibration in white noise does not need)
 
     L, failed = lapack.dpotrf(M.T, lower=1)
@@ -110,6 +112,8 @@ def divided(L: Floats, rows: Floats, turned: bool = False) -> Floats:
     ndarray, shape (r, m)
         In the same unit.
     """
+    if not L.size:
+        return np.zeros((0, len(rows)))
     from scipy.linalg import blas  # noqa: PLC0415 (as above)
 
     return np.asarray(blas.dtrsm(1.0, L, rows.T, lower=1, trans_a=int(turned)))
