@@ -188,7 +188,7 @@ def report_of(nis, *kinds, stops=28):
     noise = tuple(NoiseTerm("gyro", kind, size=1.0) for kind in kinds)
     in_noise = 1.0 if kinds else None
     statistics = FitStatistics(0.0, nis, 100.0, 3.0, nis_in_noise=in_noise)
-    return SimpleNamespace(noise=noise, statistics=statistics, times=SimpleNamespace(stops=range(stops)))
+    return SimpleNamespace(noise=noise, statistics=statistics, by_hand=None, times=SimpleNamespace(stops=range(stops)))
 
 
 @pytest.mark.parametrize(
