@@ -192,3 +192,25 @@ def test_the_switch_changes_pages_and_figures_and_is_kept(opened: Any) -> None:
     assert before[1] != after[1]
     opened.reload()
     assert opened.evaluate(ground) == after[1]
+
+
+@pytest.mark.parametrize("width", [1280, 1440])
+def test_gyros_stand_beside_accelerometers(browser: Any, report: Path, width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 800})
+    page.goto(report.as_uri())
+    boxes = page.evaluate(
+        "[...document.querySelectorAll('#coefficient-table > .wide')].slice(0, 2)"
+        ".map(e => [e.getBoundingClientRect().top, e.scrollWidth - e.clientWidth])"
+    )
+    page.close()
+    assert boxes[0][0] == boxes[1][0]
+    assert [over for _, over in boxes] == [0, 0]
+
+
+def test_the_buttons_of_a_map_cover_none_of_its_cells(opened: Any) -> None:
+    opened.wait_for_function("document.querySelector('#verdict .js-plotly-plot .main-svg')")
+    of = "document.querySelector('#verdict {}').getBoundingClientRect().{}"
+    assert opened.evaluate(of.format(".modebar", "top")) >= opened.evaluate(of.format(".xy .hm", "bottom"))
+    titles = opened.evaluate("[...document.querySelectorAll('.modebar-btn')].map(e => e.dataset.title)")
+    assert titles
+    assert not [title for title in titles if "Share" in title]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import sdimu_calibration.report as room
+from sdimu_calibration.report.design.library import CONFIG
 from sdimu_calibration.report.design.palette import THEMES, paint, palette
 from sdimu_calibration.report.design.plotly_template import template
 from sdimu_calibration.report.design.sheet import STYLE
@@ -58,3 +59,9 @@ def test_every_role_and_every_property_has_a_colour():
 def test_nothing_that_is_painted_keeps_a_role(theme):
     assert "@" not in str(template(theme))
     assert paint({"color": ["@before", "@not a role", "x"]}, theme)["color"][1:] == ["@not a role", "x"]
+
+
+def test_no_button_of_a_figure_sends_what_was_measured_to_a_server():
+    graph = pytest.importorskip("sdimu_calibration.report.workbench.elements").graph
+    assert CONFIG["showSendToCloud"] is False
+    assert graph("heat", "words").children.config["showSendToCloud"] is False

@@ -27,12 +27,15 @@ from sdimu_calibration.report import (
     sections,
     use_section,
 )
-from sdimu_calibration.report.coefficients import as_csv, as_yaml
+from sdimu_calibration.report.coefficients import as_csv, as_yaml, grouped_table
 from sdimu_calibration.report.evidence_figures import heat_maps
 from sdimu_calibration.report.markup import prose, section
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.sections import confused, found_table
 from sdimu_calibration.report.table import rows
+from sdimu_calibration.report.traceability import traceability
+from sdimu_calibration.storage.trace import Trace
 
 
 @pytest.fixture(scope="module")
@@ -236,3 +239,30 @@ def test_a_map_of_rests_does_not_call_them_stops():
     figure = heat_maps([data.Grid(np.arange(3), np.zeros((1, 3)))], ["gyro_x"], "rest")
     assert figure.layout["xaxis"]["title"]["text"] == "rest"
     assert "at rest %{x}" in figure.data[0]["hovertemplate"]
+
+
+def test_a_column_stands_where_it_has_something_to_say(diagnosis):
+    """Only refits know a held-out error, and only what was named by a path is said again beside its name."""
+    summary = summarise(diagnosis)
+    assert "held-out error" in found_table(summary)
+    unfitted = [replace(one, held_out_before=np.nan, held_out_after=np.nan) for one in summary.found]
+    assert "held-out error" not in found_table(replace(summary, found=tuple(unfitted)))
+    made = Trace("2026-01-01 00:00 UTC", "sdimu", stated=(("site", "daejeon"), ("imu", "/lab/dtg.yaml")))
+    told = replace(diagnosis.after, origin=replace(diagnosis.after.origin, site="daejeon", imu="dtg"))
+    page = traceability(told, made)
+    assert page.count("daejeon") == 1
+    assert "/lab/dtg.yaml" in page
+
+
+def test_what_looks_like_nothing_else_is_not_among_what_is_confused(diagnosis):
+    (one,) = summarise(diagnosis).found
+    alone = replace(one, alike=(), together=(("gyro_bias_ramp_x", "gyro_bias_step_x", 0.0),))
+    assert confused(replace(summarise(diagnosis), found=(alone,))) == ""
+
+
+def test_tables_of_many_columns_stand_below_each_other(diagnosis):
+    fit = diagnosis.after
+    narrow = grouped_table(rows(fit))
+    broad = grouped_table(rows(fit, truth=dict.fromkeys(fit.names, 0.0), prior=dict.fromkeys(fit.names, 1.0)))
+    assert 'class="triads"' in narrow
+    assert 'class="triads broad"' in broad

@@ -26,6 +26,9 @@ from sdimu_calibration.report.table import Row
 
 _TEXT = frozenset({"coefficient", "unit"})
 _TRIADS = ("Gyros", "Accelerometers", "Others")
+_MOST_COLUMNS = 6
+_MOST_LETTERS = 27
+"""Columns and letters of a name up to which two tables stand beside each other on a screen of 1280 pixels."""
 
 
 def coefficients_section(
@@ -106,7 +109,8 @@ def grouped_table(entries: Sequence[table.Row]) -> str:
                 f'<div class="wide"><table><caption>{triad}</caption><thead><tr>{head}</tr></thead>'
                 f"<tbody>{''.join(lines)}</tbody></table></div>"
             )
-    return f'<div class="triads" id="coefficient-table">{"".join(tables)}</div>'
+    broad = len(columns) > _MOST_COLUMNS or any(len(row.name) > _MOST_LETTERS for row in entries)
+    return f'<div class="triads{" broad" if broad else ""}" id="coefficient-table">{"".join(tables)}</div>'
 
 
 def _line(row: table.Row, columns: list[str], kinds: Sequence[str]) -> str:

@@ -104,6 +104,8 @@ def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
 def _head(summary: DiagnosisSummary) -> str:
     """Verdict as HTML, the equation of each effect that was found under its name."""
     html = prose(summary.diagnosis.sentence).replace("(-", "(\N{MINUS SIGN}")
+    # A line never ends between a number and its sigma or its per cent.
+    html = html.replace(" \N{PLUS-MINUS SIGN} ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
     for one in summary.candidates:
         words = name_of(one)
         shown = tip(words, one.candidate.effect, [one.candidate.label])
@@ -121,7 +123,7 @@ def _unseen(summary: DiagnosisSummary) -> str:
     hidden, most = [one for one in summary.reached if not one.testable], summary.untestable[0]
     names = first_of(most.labels, _WORST)
     return (
-        f"{len(hidden)} of {len(summary.reached)} effects could not have been seen in this test, and spoil the "
+        f"{len(hidden)} of {len(summary.reached)} candidates could not have been seen in this test, and spoil the "
         f"coefficients if they are there: {names} ({most.reason})."
     )
 

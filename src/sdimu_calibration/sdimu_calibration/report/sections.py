@@ -188,13 +188,16 @@ def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
     return {label: shares for label, shares in named.items() if len(shares) > 1}
 
 
-_FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor", "held-out error")
+_FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor")
+_HELD_OUT = "held-out error"
+"""Only refits of one effect at a time know it: without them there is no such column."""
 
 
 def found_table(summary: DiagnosisSummary) -> str:
     """Return the effects that were found by families, the largest first."""
     if not summary.found:
         return sentence(_no_step(summary.diagnosis))
+    refitted = any(np.isfinite((one.held_out_before, one.held_out_after)).all() for one in summary.found)
     lines = []
     for group in families(summary.found):
         for k, one in enumerate(group):
@@ -206,12 +209,13 @@ def found_table(summary: DiagnosisSummary) -> str:
                 _own_share(one),
                 f"{one.z:+.1f}",
                 f"{one.log_bayes_factor:.0f}",
-                f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else "",
+                *([f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else ""] if refitted else ()),
             )
             name = f'<td class="text">{family_words(group) if not k else ""}</td>'
             label = f'<td class="text"><code>{escape(one.candidate.label)}</code></td>'
             lines.append(f"<tr>{name}{label}{''.join(f'<td>{escape(text)}</td>' for text in cells)}</tr>")
-    head = "".join(f'<th scope="col"{" class=text" if k < 2 else ""}>{word}</th>' for k, word in enumerate(_FOUND))
+    words = (*_FOUND, _HELD_OUT) if refitted else _FOUND
+    head = "".join(f'<th scope="col"{" class=text" if k < 2 else ""}>{word}</th>' for k, word in enumerate(words))
     tried = "" if summary.candidates else sentence("Tried, but not enough to explain the misfit:")
     body = "".join(lines)
     return f'{tried}<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
@@ -243,6 +247,8 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
             if p >= NAMED
         )
         others = "; ".join(part for part in (others, pairs) if part)
+        if not others:
+            continue
         stake = "; ".join(
             f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
             for s in one.coefficient_shifts[:3]

@@ -21,7 +21,12 @@ def traceability(calibration: Calibration, trace: Trace | None) -> str:
             ("command", f"<code>{escape(trace.command)}</code>" if trace.command else "from Python"),
             ("program", escape(trace.program)),
             ("made", escape(trace.made)),
-            *((key, f"<code>{escape(value)}</code>") for key, value in trace.stated),
+            # A name that the result itself holds stands above: only files are said again, with their path.
+            *(
+                (key, f"<code>{escape(value)}</code>")
+                for key, value in trace.stated
+                if value not in {origin.site, origin.imu}
+            ),
         ]
     )
     length = f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else ""

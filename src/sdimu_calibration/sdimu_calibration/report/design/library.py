@@ -12,8 +12,15 @@ from sdimu_calibration.report.design.palette import THEMES, palette
 from sdimu_calibration.report.design.plotly_template import template
 
 _HERE = files("sdimu_calibration.report.design")
-CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["lasso2d", "select2d"]}
-"""Buttons of a figure."""
+NEEDLESS = ("zoomIn2d", "zoomOut2d", "autoScale2d")
+"""Buttons that do what a box and a double click do: without them the others cover less of a figure."""
+CONFIG = {
+    "responsive": True,
+    "displaylogo": False,
+    "showSendToCloud": False,
+    "modeBarButtonsToRemove": ["lasso2d", "select2d", *NEEDLESS],
+}
+"""Buttons of a figure: none sends to a server what was measured."""
 PRINT = (_HERE / "print.js").read_text(encoding="utf-8")
 """Fits the figures of a page to the sheet while it is printed."""
 

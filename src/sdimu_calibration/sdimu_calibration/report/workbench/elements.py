@@ -7,7 +7,7 @@ from typing import Any
 
 from dash import dcc, html
 
-from sdimu_calibration.report.design.library import CONFIG
+from sdimu_calibration.report.design.library import CONFIG, NEEDLESS
 
 
 def card(title: str, *parts: Any, more: str = "") -> Any:
@@ -24,5 +24,6 @@ def table(headings: Sequence[str], rows: Iterable[Any]) -> Any:
 def graph(name: str, words: str) -> Any:
     """Return the place of a figure, with words for those who do not see it."""
     # Plotly's own "responsive" would take the height of the container, which has none; the component follows the width.
-    config = {key: value for key, value in CONFIG.items() if key not in ("responsive", "modeBarButtonsToRemove")}
+    config = {key: value for key, value in CONFIG.items() if key != "responsive"}
+    config["modeBarButtonsToRemove"] = list(NEEDLESS)
     return html.Div(dcc.Graph(id=name, config=config), role="group", **{"aria-label": words})
