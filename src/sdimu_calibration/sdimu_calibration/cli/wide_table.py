@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,14 @@ def print_table(
 ) -> None:
     """Print lines under headings; the first `left` columns and the last one are text, the others numbers.
 
-    Where the window is narrow, headings are broken between words, then columns stand closer; where that is not enough,
+    A column that no line fills is left out. Where the window is narrow, headings are broken between words, then columns stand closer; where that is not enough,
     each line becomes a paragraph.
     """
-    broken = [heading.replace(" ", "\n") for heading in headings]
+    kept = [place for place in range(len(headings)) if place < left or any(line[place] for line in lines)]
+    words = [place < left or place == len(headings) - 1 for place in kept]
+    headings, lines = [headings[k] for k in kept], [[line[k] for k in kept] for line in lines]
+    # A sign of per cent stays with its number.
+    broken = [re.sub(" (?!%)", "\n", heading) for heading in headings]
     for heads, gap in ((headings, 1), (broken, 1), (broken, 0)):
         widths = [
             max(len(text) for text in (*head.split("\n"), *(line[place] for line in lines)))
@@ -28,7 +33,7 @@ def print_table(
         ]
         if sum(widths) + (2 * gap + 1) * (len(widths) - 1) + 2 <= console.width:
             # Nothing has to be wrapped, so nothing may be cut.
-            console.print(_table(heads, widths, lines, title, left, gap), soft_wrap=True)
+            console.print(_table(heads, widths, lines, title, words, gap), soft_wrap=True)
             return
     _paragraphs(console, headings, lines, title)
 
@@ -38,7 +43,7 @@ def _table(
     widths: Sequence[int],
     lines: Sequence[Sequence[str]],
     title: str | None,
-    left: int,
+    words: Sequence[bool],
     gap: int,
 ) -> Table:
     from rich.box import SIMPLE_HEAD
@@ -46,8 +51,7 @@ def _table(
 
     table = Table(title=title, title_justify="left", pad_edge=False, box=SIMPLE_HEAD, padding=(0, gap, 0, gap))
     for place, heading in enumerate(headings):
-        is_text = place < left or place == len(headings) - 1
-        table.add_column(heading, justify="left" if is_text else "right", min_width=widths[place])
+        table.add_column(heading, justify="left" if words[place] else "right", min_width=widths[place])
     for line in lines:
         table.add_row(*(text.replace("[", r"\[") for text in line))
     return table
