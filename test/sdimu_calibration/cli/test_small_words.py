@@ -135,11 +135,10 @@ def test_a_node_without_last_words_on_a_full_disk_is_told_as_such(tmp_path, monk
 
 def test_a_table_has_no_column_that_says_nothing_and_no_per_cent_apart_from_its_number(capsys):
     headings = ("term", "value", "95 %", "limit", "number of recordings", "verdict")
-    print_table(
-        plain(width=60), headings, [["gyro bias", "1.45", "1.44..1.46", "", "10", ""], ["x", "3", "", "", "1", ""]]
-    )
+    bias = ["gyro bias", "1.45", "1.44..1.46", "", "10", ""]
+    print_table(plain(width=60), headings, [bias, ["x", "3", "", "", "1", ""]])
     head, *lines = [line for line in capsys.readouterr().out.splitlines() if line.strip()]
     assert head.split() == ["term", "value", "95", "%", "number", "of", "recordings"]
     assert [line.rstrip()[-2:] for line in lines if "gyro" in line or "x" in line] == ["10", " 1"]
-    print_table(plain(width=45), headings, [["gyro bias", "1.45", "1.44..1.46", "", "10", ""]])
+    print_table(plain(width=45), headings, [bias])
     assert "95 %" in capsys.readouterr().out

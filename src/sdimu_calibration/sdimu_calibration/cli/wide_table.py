@@ -18,8 +18,8 @@ def print_table(
 ) -> None:
     """Print lines under headings; the first `left` columns and the last one are text, the others numbers.
 
-    A column that no line fills is left out. Where the window is narrow, headings are broken between words, then columns stand closer; where that is not enough,
-    each line becomes a paragraph.
+    A column that no line fills is left out. Where the window is narrow, headings are broken between words, then columns
+    stand closer; where that is not enough, each line becomes a paragraph.
     """
     kept = [place for place in range(len(headings)) if place < left or any(line[place] for line in lines)]
     words = [place < left or place == len(headings) - 1 for place in kept]
