@@ -120,6 +120,24 @@ def test_a_diagnosis_is_drawn_and_told(found):
     assert any("--add" in line for line in found.advice)
 
 
+def test_what_may_be_missing_is_a_table_with_units(found):
+    table = found.to_dataframe()
+    members = [m for family in found.probabilities.families for m in family.members]
+    assert sorted(table.index) == sorted(m.label for m in members)
+    assert list(table["probability"]) == sorted((m.probability for m in members), reverse=True)
+    row = table.loc[HIDDEN]
+    assert row["unit"] == "ug/g^2"
+    assert abs(row["value"] - 40.0) < 5.0 * row["sigma"]
+
+
+def test_matplotlib_draws_a_diagnosis_in_the_same_colours(found):
+    pytest.importorskip("matplotlib")
+    assert [axes.get_xlabel() for axes in found.plot_heat_map(library="matplotlib").axes][-1] == "stop"
+    assert found.plot_ranking(library="matplotlib").axes[0].get_xlabel() == "score |z| (sigma)"
+    with pytest.raises(DataError, match="expected 'plotly' or 'matplotlib'"):
+        found.plot_ranking(library="bokeh")
+
+
 def test_files_are_those_of_the_verbs(fit, found, tmp_path):
     saved = read_result(fit.save(tmp_path / "fit"))
     np.testing.assert_array_equal(saved.values, fit.values)

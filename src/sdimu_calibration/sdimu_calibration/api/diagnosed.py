@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
-from sdimu_calibration.core.posterior.told import Probabilities
+from sdimu_calibration.core.posterior.told import MemberShare, Probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.extras import needed
 from sdimu_calibration.report.unknown_section import followed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def _size(member: MemberShare) -> tuple[float, float]:
+    """Size and sigma in the customary unit."""
+    return from_si(member.value, member.display_unit), from_si(member.sigma, member.display_unit)
 
 
 class Diagnosed(ABC):
@@ -43,6 +53,21 @@ class Diagnosed(ABC):
     @abstractmethod
     def unknown(self) -> tuple[UnknownFunction, ...]:
         """Errors that no effect explains and that follow something: mean and sigma by stretch, or at all stops."""
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Effects that may be missing as a table, the likeliest first: family, probability, size if it is this one.
+
+        Columns: effect (the index), family, probability, value, sigma, unit (customary). As in `probabilities`.
+        """
+        families = self.probabilities.families if self.probabilities else ()
+        rows = [
+            (m.label, f"{family.family}, {family.sensor}", m.probability, *_size(m), m.display_unit)
+            for family in families
+            for m in family.members
+        ]
+        columns = ["effect", "family", "probability", "value", "sigma", "unit"]
+        made: pd.DataFrame = needed("pandas").DataFrame(rows, columns=columns)
+        return made.sort_values("probability", ascending=False, kind="stable").set_index("effect")
 
     def plot_unknown(self) -> tuple[Any, ...]:
         """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""

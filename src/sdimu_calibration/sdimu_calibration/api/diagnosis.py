@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.api.diagnosed import Diagnosed
+from sdimu_calibration.api.figure_library import Library, drawn
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
@@ -89,11 +90,20 @@ class FitDiagnosis(Diagnosed):
         """Errors that no effect explains and that follow attitude, rate or temperature: mean and sigma by stretch."""
         return unknown_of(self.core)
 
-    def plot_ranking(self) -> Any:
-        """Scores of the candidates against what noise reaches (a plotly figure)."""
+    def plot_ranking(self, library: Library = "plotly") -> Any:
+        """Scores of the candidates against what noise reaches (a figure of plotly or matplotlib)."""
+        self._drawable(library)
+        return drawn(library, self._ranking, "candidates", self.core)
+
+    def _drawable(self, library: Library) -> None:
+        """Refuse matplotlib for a run by hand, of which there are no such pictures."""
+        if library != "plotly" and not isinstance(self.core.evidence, NavigationEvidence):
+            raise DataError("of a run by hand there are figures of plotly alone: library='plotly'")
+
+    def _ranking(self) -> Figure:
         if not isinstance(self.core.evidence, NavigationEvidence):
-            return self._ranking_of_a_run().as_plotly()
-        return evidence_figures.ranking(data.scored(self.core), self.core.found.threshold).as_plotly()
+            return self._ranking_of_a_run()
+        return evidence_figures.ranking(data.scored(self.core), self.core.found.threshold)
 
     def _ranking_of_a_run(self) -> Figure:
         problem, found = Problem(self.core.evidence), self.core.found
@@ -104,9 +114,16 @@ class FitDiagnosis(Diagnosed):
             data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
         )
 
-    def plot_heat_map(self) -> Any:
-        """Mean residual of every channel at every stop over its sigma, model as given (a plotly figure)."""
-        return evidence_figures.heat_map(*data.places(self.core.consistency.where)).as_plotly()
+    def plot_heat_map(self, library: Library = "plotly") -> Any:
+        """Mean residual of every channel at every stop over its sigma (a figure of plotly or matplotlib).
+
+        Of the model as given; matplotlib draws that with what was found below it.
+        """
+        self._drawable(library)
+        return drawn(library, self._heat_map, "heat_maps", self.core)
+
+    def _heat_map(self) -> Figure:
+        return evidence_figures.heat_map(*data.places(self.core.consistency.where))
 
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""

@@ -1,0 +1,26 @@
+"""The library that draws the figures of a diagnosis: plotly, under the mouse, or matplotlib, for a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.plain_text import printable
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.extras import needed
+from sdimu_calibration.report.drawing import Figure
+
+Library = Literal["plotly", "matplotlib"]
+
+
+def drawn(library: Library, made: Callable[[], Figure], picture: str, diagnosis: Diagnosis) -> Any:
+    """Return a figure in a library: `made` by plotly, or the `picture` of a diagnosis (`report.pictures`)."""
+    if library == "plotly":
+        return made().as_plotly()
+    if library != "matplotlib":
+        raise DataError(f"library {printable(str(library))!r}: expected 'plotly' or 'matplotlib'")
+    # It loads matplotlib, which is optional.
+    pictures = needed("sdimu_calibration.report.pictures")
+    with pictures.mpl.rc_context(pictures.STYLE):
+        return getattr(pictures, picture)(diagnosis)
