@@ -192,3 +192,17 @@ def test_the_page_breaks_no_serious_rule_of_access(visit: Callable[[], Any], the
     settle(page)
     found = axe.Axe().run(page).response["violations"]
     assert [(rule["id"], rule["nodes"][0]["html"]) for rule in found if rule["impact"] in {"serious", "critical"}] == []
+
+
+@pytest.mark.parametrize("width", [1280, 1440])
+def test_numbers_stand_in_the_cells_only_where_they_fit(visit: Callable[[], Any], width: int) -> None:
+    page = visit()
+    page.set_viewport_size({"width": width, "height": 900})
+    page.wait_for_timeout(600)
+    room, need = page.evaluate(
+        "() => { const c = document.createElement('canvas').getContext('2d');"
+        "c.font = '10px ' + getComputedStyle(document.querySelector('#heat text')).fontFamily;"
+        "const map = document.querySelector('#heat .js-plotly-plot')._fullLayout.xaxis._length;"
+        "return [map / benchLook().stops, c.measureText('+2.1').width]; }"
+    )
+    assert room > need + 1

@@ -103,7 +103,8 @@ def ranking(
     first, each with its probability in words. Those share the bar of the effect.
     """
     told = classes or {}
-    folded = {name for label, shares in told.items() for name in shares if name != label.partition("(")[0]}
+    found = {label.partition("(")[0] for label in told}
+    folded = {name for shares in told.values() for name in shares} - found
     left = [s for s in data.best_variants(entries) if s.chosen or s.label.partition("(")[0] not in folded]
     shown = left[:_MOST_BARS]
     names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + literal(s.label) for s in shown]

@@ -59,8 +59,12 @@ def prose(text: str) -> str:
 
 
 def signs(text: str) -> str:
-    """Return a sentence of a diagnosis with the signs of print for what a terminal writes with its own."""
-    return text.replace(" +- ", " \N{PLUS-MINUS SIGN} ").replace("(-", "(\N{MINUS SIGN}")
+    """Return a sentence of a diagnosis with the signs of print for what a terminal writes with its own.
+
+    No line ends between a number and its sigma or its per cent.
+    """
+    together = text.replace(" +- ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
+    return together.replace("(-", "(\N{MINUS SIGN}")
 
 
 def quiet(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out, literal
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, INK, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.workbench.axes import TIME
 from sdimu_calibration.report.workbench.fit import Fitted
 
@@ -20,7 +20,7 @@ HEIGHT = 297
 """Height of a figure (px): two rows of them and the bar fit on a screen of 900."""
 _CELL = 10
 """Size of the numbers in the cells (px): with it those of 19 stops stand beside each other."""
-_MOST_NUMBERED = 22
+_MOST_NUMBERED = 20
 """Number of stops whose numbers stand beside each other in the column of the heat map on a screen of 1440."""
 _MOST_BARS = 14
 _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
@@ -58,15 +58,38 @@ def most_numbered(look: Any) -> int:
     return int(look.get("stops", _MOST_NUMBERED))
 
 
-def ranking(entries: Sequence[data.Scored], threshold: float) -> Figure:
-    """Ranking of the report, without the sizes: the candidate that is looked at has its own beside it."""
-    shown = data.best_variants(entries)[:_MOST_BARS]
-    figure = evidence_figures.ranking(shown, threshold)
+def ranking(
+    entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, Mapping[str, str]] | None = None
+) -> Figure:
+    """Ranking of the report, without the sizes: the candidate that is looked at has its own beside it.
+
+    `classes`: as `evidence_figures.ranking` takes them. What looks the same as an effect that was found shares its bar,
+    which tells how probable it is: the score alone may put the less probable first.
+    """
+    figure = evidence_figures.ranking(entries, threshold, classes)
     del figure.data[1]
-    figure.x_axes(range=[0, 1.05 * max([abs(e.z) for e in shown] + [threshold])])
+    bars = figure.data[0]
+    for key in ("x", "y", "customdata"):
+        bars[key] = bars[key][:_MOST_BARS]
+    bars["marker"] |= {key: bars["marker"][key][:_MOST_BARS] for key in ("color", "opacity")}
+    bars |= {
+        "text": [_class_in_words((classes or {}).get(label, {})) for label in bars["y"]],
+        "textposition": "inside",
+        "insidetextanchor": "start",
+        "textangle": 0,
+        "textfont": {"color": INK, "size": 11},
+    }
+    figure.x_axes(range=[0, 1.05 * max([*bars["x"], threshold])])
+    figure.y_axes(range=[len(bars["y"]) - 0.5, -0.5])
     figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
     figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
     return figure
+
+
+def _class_in_words(shares: Mapping[str, str]) -> str:
+    """Say how probable the first of a class is, and how many others it may be; empty where there is no class."""
+    others = len(shares) - 1
+    return f"{next(iter(shares.values()))}, or {others} other{'s' if others > 1 else ''}" if others > 0 else ""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ page shows: the matrices of a fit and of its candidates, some 300 MB, stay for t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from threading import RLock
 from typing import Any
 
@@ -39,6 +39,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
 from sdimu_calibration.report.cost import Off, wrong_without
 from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.sections import classes_of
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
@@ -99,6 +100,8 @@ class Missing:
     worst: Off | None = None
     """The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
     """
+    classes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """What each effect that was found may be, itself first, each with its probability in words."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,7 @@ class FitSession:
                     unknown_of(told),
                     _mended(summary),
                     off[0] if off else None,
+                    classes_of(summary.found),
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]

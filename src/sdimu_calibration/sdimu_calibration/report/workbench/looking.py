@@ -50,7 +50,7 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         against = bench.objections(now.now, tell)
         missing = bench.missing(now.now, tell)
         told, tone = parts.verdict(missing, against)
-        picture = figures.finished(figures.ranking(missing.entries, missing.threshold), look)
+        picture = figures.finished(figures.ranking(missing.entries, missing.threshold, missing.classes), look)
         still = chosen if chosen in {entry.label for entry in missing.entries} else None
         lines = [html.Li(line) for line in against]
         return (

@@ -36,7 +36,7 @@
   new MutationObserver(mend).observe(document.documentElement, {childList: true, subtree: true});
 
   // Width of a number in a cell of a heat map, and what stands beside the cells (px).
-  var NUMBER = 25, MARGINS = 90;
+  var NUMBER = 27, MARGINS = 90;
   window.benchLook = function () {
     var scale = window.innerWidth >= 2400 ? 1.6 : 1, look = {scale: scale, theme: window.sdimuTheme ? window.sdimuTheme() : 'light'};
     var wide = at('heat') && at('heat').clientWidth;
