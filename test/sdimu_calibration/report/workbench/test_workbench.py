@@ -453,5 +453,5 @@ def test_look_alikes_share_a_bar_that_tells_how_probable_its_effect_is():
     assert figures.ranking(entries, 4.1).data[0]["y"][0] == "gyro_scale_quadratic_y"
     bars = figures.ranking(entries, 4.1, classes).data[0]
     assert bars["y"] == ["gyro_scale_asymmetry_y", "accel_cubic_x"]
-    assert bars["text"] == ["85 %, or 1 other", ""]
+    assert bars["text"] == ["85 %", ""]
     assert bars["customdata"][0].endswith("or gyro_scale_quadratic_y 15 %")

@@ -73,23 +73,24 @@ def ranking(
         bars[key] = bars[key][:_MOST_BARS]
     bars["marker"] |= {key: bars["marker"][key][:_MOST_BARS] for key in ("color", "opacity")}
     bars |= {
-        "text": [_class_in_words((classes or {}).get(label, {})) for label in bars["y"]],
+        "text": [_share((classes or {}).get(label, {})) for label in bars["y"]],
+        "constraintext": "none",
         "textposition": "inside",
         "insidetextanchor": "start",
         "textangle": 0,
         "textfont": {"color": INK, "size": 11},
     }
-    figure.x_axes(range=[0, 1.05 * max([*bars["x"], threshold])])
+    # The names leave a narrow axis, for which the title of the report is too long.
+    figure.x_axes(title="|z| (sigma)", nticks=4, range=[0, 1.05 * max([*bars["x"], threshold])])
     figure.y_axes(range=[len(bars["y"]) - 0.5, -0.5])
     figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
     figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
     return figure
 
 
-def _class_in_words(shares: Mapping[str, str]) -> str:
-    """Say how probable the first of a class is, and how many others it may be; empty where there is no class."""
-    others = len(shares) - 1
-    return f"{next(iter(shares.values()))}, or {others} other{'s' if others > 1 else ''}" if others > 0 else ""
+def _share(shares: Mapping[str, str]) -> str:
+    """Say how probable the first of a class is; empty where there is no class. The others stand under the mouse."""
+    return next(iter(shares.values())) if len(shares) > 1 else ""
 
 
 @dataclass(frozen=True)
