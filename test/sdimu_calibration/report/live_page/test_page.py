@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sdimu_calibration.report.live_page import figures
+from sdimu_calibration.report.live_page import figures, parts
 from sdimu_calibration.report.live_page.app import build
 from sdimu_calibration.report.live_page.curves import Drawn
-from sdimu_calibration.report.live_page.record import End, LiveRecord
+from sdimu_calibration.report.live_page.record import End, Head, LiveRecord
 from sdimu_calibration.report.live_page.visitors import Visitors
 from sdimu_calibration.report.live_text import SeenChoice, SeenDiagnosis
 
@@ -225,3 +225,9 @@ def test_a_page_after_hours_is_small():
 def test_every_verdict_has_a_tone(verdict):
     tone = Page(record_of(Now(diagnosis=SeenDiagnosis(1, verdict, "said")))).ask()["verdict"]["className"].split()[1]
     assert tone == {"consistent": "good", "waiting": "neutral", "data fault": "bad"}.get(verdict, "doubtful")
+
+
+def test_a_test_that_has_ended_shows_no_bar_that_seems_to_wait():
+    head = Head("stop 3", share=0.1)
+    assert "Progress" in str(parts.place(head))
+    assert "Progress" not in str(parts.place(replace(head, end=End(True, "The test has ended.", ""))))

@@ -36,8 +36,8 @@ _FONT = {"size": 12}
 _KEPT = "kept"
 """Name under which plotly keeps what a person zoomed, while a figure grows."""
 _MARGIN = {"l": 60, "r": 14, "t": 10, "b": 44}
-_LEGEND_FONT = 11
-"""Size of the words of a legend (px)."""
+_LEGEND_FONT = 10
+"""Size of the words of a legend (px): with it the longest, of mass unbalances, is not cut at the end of its unit."""
 _LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": _LEGEND_FONT}}
 _ENTRY = 176
 """Width of the words of an entry of the legend (px): two stand beside each other in a column of 470."""

@@ -32,8 +32,11 @@ NOT_YET = "No diagnosis so far; one is made at the end of each stop."
 
 
 def place(head: Head) -> Any:
-    """Say where the test is, with a bar where it is known how long it lasts."""
-    bar = [] if head.share is None else [_bar(head.share)]
+    """Say where the test is, with a bar where it is known how long it lasts; a test that has ended has none.
+
+    One that chooses its turns may end at a tenth of its time, and a bar that stands there looks like one that waits.
+    """
+    bar = [] if head.end or head.share is None else [_bar(head.share)]
     return [html.B(head.place), *bar, html.Span(head.time)]
 
 
