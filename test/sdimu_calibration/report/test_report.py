@@ -34,7 +34,7 @@ from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.sections import confused, found_table
 from sdimu_calibration.report.table import rows
-from sdimu_calibration.report.traceability import traceability
+from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.storage.trace import Trace
 
 
@@ -266,3 +266,8 @@ def test_tables_of_many_columns_stand_below_each_other(diagnosis):
     broad = grouped_table(rows(fit, truth=dict.fromkeys(fit.names, 0.0), prior=dict.fromkeys(fit.names, 1.0)))
     assert 'class="triads"' in narrow
     assert 'class="triads broad"' in broad
+
+
+def test_a_stamp_that_counts_from_a_start_is_no_date():
+    assert recorded(101_200_000_000) == ""
+    assert recorded(1_700_000_000_000_000_000) == "2023-11-14 22:13:20 UTC"

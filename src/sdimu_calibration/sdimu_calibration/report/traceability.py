@@ -10,6 +10,9 @@ from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report.markup import section
 from sdimu_calibration.storage.trace import Trace
 
+_DATED_NS = 315_532_800 * 10**9
+"""Stamp from which it is a date (ns since 1970): that of 1980; a smaller one counts from the start of a driver."""
+
 
 def traceability(calibration: Calibration, trace: Trace | None) -> str:
     """Return the section that lets a reader make the result again."""
@@ -59,4 +62,6 @@ def _facts(rows: Sequence[tuple[str, str]]) -> str:
 
 def recorded(start_ns: int) -> str:
     """Say when a recording began; empty where its stamps do not tell."""
-    return datetime.fromtimestamp(1e-9 * start_ns, UTC).strftime("%Y-%m-%d %H:%M:%S UTC") if start_ns else ""
+    return (
+        datetime.fromtimestamp(1e-9 * start_ns, UTC).strftime("%Y-%m-%d %H:%M:%S UTC") if start_ns >= _DATED_NS else ""
+    )
