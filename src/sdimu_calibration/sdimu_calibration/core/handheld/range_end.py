@@ -8,7 +8,8 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.recording import Recording
 
 _LEAST_IN_A_ROW = 3
-"""Least number of consecutive readings at the extreme number that is saturation: noise does not repeat its extreme."""
+"""Least number of consecutive measurements at the extreme number that is saturation: noise does not repeat its
+extreme."""
 
 
 def at_range_end(recording: Recording) -> Bools:
@@ -26,14 +27,21 @@ def at_range_end(recording: Recording) -> Bools:
 def _clipped(x: Floats) -> Bools:
     if x.min() == x.max():
         return np.zeros(len(x), dtype=bool)
-    return _in_a_row(x == x.max()) | _in_a_row(x == x.min())
+    least = _LEAST_IN_A_ROW * _readings_each(x)
+    return _in_a_row(x == x.max(), least) | _in_a_row(x == x.min(), least)
 
 
-def _in_a_row(flags: Bools) -> Bools:
-    """Keep runs of `_LEAST_IN_A_ROW` and more."""
+def _readings_each(x: Floats) -> int:
+    """Count the readings of one measurement: a logger faster than its sensor writes each several times."""
+    ends = np.flatnonzero(x[1:] != x[:-1])
+    return round(float(np.median(np.diff(ends, prepend=-1, append=len(x) - 1))))
+
+
+def _in_a_row(flags: Bools, least: int) -> Bools:
+    """Keep runs of `least` and more."""
     edge = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
     first, last = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
     out = np.zeros(len(flags), dtype=bool)
     for a, b in zip(first, last, strict=True):
-        out[a:b] = b - a >= _LEAST_IN_A_ROW
+        out[a:b] = b - a >= least
     return out
