@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis import found
+from sdimu_calibration.core.diagnosis.advice import untestable_by_hand, untestable_reasons
+from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.evidence.testable import WORST_SENSOR
 from sdimu_calibration.report import data, sections
 
@@ -29,6 +31,19 @@ def test_what_only_an_impossible_size_would_show_is_not_shown_by_the_plan(diagno
     lost = [one for one, before in zip(fewer, whole, strict=True) if before.testable and not one.testable]
     assert lost
     assert all(ratio[one.label] > some for one in lost)
+
+
+def test_what_only_an_impossible_size_would_show_is_not_said_to_be_hidden_by_the_motion_or_the_model(diagnosis):
+    """Products of forces were told not to be excited, of whose signature the model leaves 96 %."""
+    (square,) = [one for one in found.reach(diagnosis) if one.label == "gyro_g_squared_xx"]
+    assert square.retention > 0.5
+    hidden = replace(square, testable=False, partners=("gyro_bias_x",))
+    gone = replace(hidden, retention=0.001)
+    for told, other in (
+        (untestable_reasons((hidden, gone), plan_seen(diagnosis.evidence)), "coefficients of the model take it"),
+        (untestable_by_hand((hidden, gone)), "the motion of this run does not excite it"),
+    ):
+        assert [one.reason for one in told] == ["at no size that a sensor has does it stand out of the noise", other]
 
 
 def test_the_page_states_no_impossible_size(diagnosis):

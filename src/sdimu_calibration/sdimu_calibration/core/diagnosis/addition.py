@@ -12,7 +12,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.advice import reason, telling_turn
+from sdimu_calibration.core.diagnosis.advice import NOT_BY_HAND, reason, telling_turn
 from sdimu_calibration.core.diagnosis.found import DetectableSize
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
@@ -152,7 +152,7 @@ def _why(evidence: LinearEvidence, column: int) -> str:
     """Reason why a candidate does not show."""
     candidate = evidence.candidates[column - len(evidence.weight)]
     if not isinstance(evidence, NavigationEvidence):
-        return "the motion of this run does not excite it"
+        return NOT_BY_HAND
     parameter = candidate.parameter
     size = DetectableSize(
         candidate.label,

@@ -6,7 +6,7 @@ two rates, a product of forces stops between the axes, a change with time the sa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,11 +22,16 @@ from sdimu_calibration.core.diagnosis.screen import Finding
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.evidence.consistency import Noise
+from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.noise_term import FOLLOWS
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 
+NOT_BY_HAND = "the motion of this run does not excite it"
+"""Reason why a run by hand does not show an effect."""
+_TOO_SMALL = "at no size that a sensor has does it stand out of the noise"
+"""Reason why a test does not show an effect that it excites."""
 _SLOW_MINUTES = 20.0
 """Length of the stay that is advised for a change with time (min): usual time constants of a warm-up lie within it."""
 _MOST_STAKES = 3
@@ -44,12 +49,26 @@ class Untestable:
 
 def untestable_reasons(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> tuple[Untestable, ...]:
     """Sort what is not testable by the reason; the largest groups first."""
+    return _sorted(reached, lambda one: reason(one, plan))
+
+
+def untestable_by_hand(reached: tuple[DetectableSize, ...]) -> tuple[Untestable, ...]:
+    """Sort what a run by hand does not show by the reason; the largest groups first."""
+    return _sorted(reached, lambda one: _TOO_SMALL if _shows(one) else NOT_BY_HAND)
+
+
+def _sorted(reached: tuple[DetectableSize, ...], why: Callable[[DetectableSize], str]) -> tuple[Untestable, ...]:
     groups: dict[str, list[str]] = {}
     for one in reached:
         if not one.testable:
-            groups.setdefault(reason(one, plan), []).append(one.label)
+            groups.setdefault(why(one), []).append(one.label)
     ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
-    return tuple(Untestable(why, tuple(labels)) for why, labels in ordered)
+    return tuple(Untestable(text, tuple(labels)) for text, labels in ordered)
+
+
+def _shows(one: DetectableSize) -> bool:
+    """Whether a test shows an effect, if only at a size that no sensor has."""
+    return one.retention > TESTABLE and bool(np.isfinite(one.smallest))
 
 
 def reason(one: DetectableSize, plan: PlanSeen) -> str:
@@ -66,6 +85,8 @@ def reason(one: DetectableSize, plan: PlanSeen) -> str:
         return "every turn is about one body axis: needs turns about two at once"
     if Excitation.OBLIQUE_STOPS in needed and not plan.oblique:
         return "no stop lies between the body axes: split turns of 90 deg into halves of 45 deg"
+    if _shows(one):
+        return _TOO_SMALL
     if one.partners:
         return "coefficients of the model take it"
     return "the motion of this test does not excite it"

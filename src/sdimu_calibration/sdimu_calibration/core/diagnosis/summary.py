@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sdimu_calibration.core.advice import Advice
-from sdimu_calibration.core.diagnosis.advice import Untestable, advice, handheld_advice, untestable_reasons
+from sdimu_calibration.core.diagnosis.advice import (
+    Untestable,
+    advice,
+    handheld_advice,
+    untestable_by_hand,
+    untestable_reasons,
+)
 from sdimu_calibration.core.diagnosis.assumed import Assumed, assumed_absent
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found, reach
@@ -43,9 +49,8 @@ def summarise(d: Diagnosis) -> DiagnosisSummary:
     """Work out what a diagnosis has to say."""
     found, reached = d.found_effects, reach(d)
     if not isinstance(d.evidence, NavigationEvidence):
-        hidden = tuple(r.label for r in reached if not r.testable)
-        unseen = (Untestable("the motion of this run does not excite it", hidden),) if hidden else ()
-        return DiagnosisSummary(d, found, reached, None, unseen, handheld_advice(d, found), assumed_absent(d))
+        told = handheld_advice(d, found)
+        return DiagnosisSummary(d, found, reached, None, untestable_by_hand(reached), told, assumed_absent(d))
     plan = plan_seen(d.evidence)
     reasons, told = untestable_reasons(reached, plan), advice(d, found, reached, plan)
     return DiagnosisSummary(d, found, reached, plan, reasons, told, assumed_absent(d))
