@@ -47,7 +47,7 @@ def tilted(recording, at_s, arcsec, of_gyros=1.0):
 
 
 def told(recording):
-    return [fault for fault in reduce(recording, SETUP).faults if fault.kind == "motion at rest"]
+    return [fault.text for fault in reduce(recording, SETUP).faults if fault.kind == "motion at rest"]
 
 
 @pytest.mark.parametrize("silent", [False, True], ids=["status", "no status"])
@@ -66,6 +66,25 @@ def test_a_tilt_is_motion_and_the_coefficients_stay_right(silent):
     z = baseline_z(outcome(solve(PreparedTest(moved, IMU, SITE), MODEL)), truth.imu)
     assert np.sqrt(np.mean(z**2)) < 1.5
     assert np.max(np.abs(z)) < 4.5
+
+
+def test_a_tilt_is_seen_in_a_recording_of_a_minute():
+    recording = recorded()[0]
+    at = middle_of(recording, 6)
+    moved = tilted(recording, at, 20.0)
+    rows = np.abs(recording.t - at) <= 28.0
+    omega, force = moved.omega_ib_b[rows], moved.f_ib_b[rows]
+    short = replace(moved, t=moved.t[rows] - at + 28.0, omega_ib_b=omega, f_ib_b=force, phase=None, table=None)
+    (fault,) = told(short)
+    assert "tilted within 1 of its rests" in fault
+
+
+def test_tilts_in_all_rests_are_seen():
+    recording = recorded()[0]
+    for stop in range(19):
+        recording = tilted(recording, middle_of(recorded()[0], stop), 20.0)
+    (fault,) = told(recording)
+    assert "tilted within 19 of its rests" in fault
 
 
 def test_stops_after_a_tilt_have_numbers_of_their_own_without_a_status():

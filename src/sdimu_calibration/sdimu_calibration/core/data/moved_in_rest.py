@@ -106,10 +106,13 @@ def _moved(epochs: Epochs, dwell: Bools, imu: ImuSpecification) -> tuple[Bools, 
         least = imu.accel_white_noise * np.sqrt(2.0 / _BESIDE), imu.gyro_white_noise * np.sqrt(length)
         gravity = float(np.linalg.norm(epochs.f_mean[tilts.begin[0]]))
         seen, felt = (np.linalg.norm(x, axis=1) for x in (tilts.force, tilts.gyros))
-        of_force, of_gyros = max(_sigma(seen), least[0]), max(_sigma(felt), gravity * least[1])
+        turned = felt > _SIGMAS * max(_sigma(felt), gravity * least[1])
+        # Within reach of a turn the forces change by it: in a short recording that is most of it, and no noise.
+        calm = ~_in_reach(tilts, turned, len(epochs))
+        of_force = max(_sigma(seen[calm] if calm.any() else seen), least[0])
         apart = np.linalg.norm(tilts.force - tilts.gyros, axis=1)
         likelier = 0.5 * (seen**2 - apart**2) / of_force**2
-        sure = (felt > _SIGMAS * of_gyros) & (likelier > _LOG_ODDS) & (apart < _APART * felt)
+        sure = turned & (likelier > _LOG_ODDS) & (apart < _APART * felt)
         for k in tilts.begin[sure].tolist():
             here = slice(k, k + length)
             moved[here] |= turns[here] | (slow[here] == slow[here].max())
@@ -143,6 +146,15 @@ def _tilts(epochs: Epochs, dwell: Bools, rate: Floats, length: int) -> _Tilts:
     change = after - before
     across = change - along * np.sum(along * change, axis=1, keepdims=True)
     return _Tilts(k, length, -np.cross(angle[k + length] - angle[k], middle), across)
+
+
+def _in_reach(tilts: _Tilts, turned: Bools, seconds: int) -> Bools:
+    """Say which of `tilts` compare forces before, in or after any that `turned`, shape (n,) of `seconds` epochs."""
+    moving = np.zeros(seconds, dtype=np.int64)
+    for second in range(tilts.length):
+        moving[tilts.begin[turned] + second] = 1
+    before = np.concatenate([[0], np.cumsum(moving)])
+    return np.asarray(before[tilts.begin + tilts.length + _BESIDE] > before[tilts.begin - _BESIDE])
 
 
 def _sigma(sizes: Floats) -> float:
