@@ -97,3 +97,11 @@ def test_a_part_that_scatters_otherwise_keeps_its_own():
     told = [note for note in set_outcome(fit).notes if "beyond white noise" in note]
     assert [note.split(":")[0] for note in told] == ["part 0, part 1", "part 2"]
     assert quiet.scatter[FORCE] < ALIKE < wild.by_hand.extra[FORCE]
+
+
+def test_a_wild_part_that_makes_the_scatter_of_all_parts_first():
+    fit = fit_set(parts(6, (8, 8, 8, 8), (0.1 * ALIKE, 0.1 * ALIKE, 0.1 * ALIKE, 20.0 * ALIKE)), OPTIONS, here)
+    *quiet, wild = fit.reports
+    assert wild.scatter is None
+    assert all(one.scatter is not None for one in quiet)
+    assert max(one.scatter[FORCE] for one in quiet) < ALIKE

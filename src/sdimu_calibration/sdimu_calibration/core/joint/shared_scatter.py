@@ -15,7 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.handheld.run_rows import RunRows
-from sdimu_calibration.core.handheld.run_scatter import WHOLE, learned, stacked_scatters
+from sdimu_calibration.core.handheld.run_scatter import WHOLE, RunScatter, learned, stacked_scatters
 
 _MOST_STEPS = 40
 """Number of steps at most: weights and residuals follow each other, and each step halves what is left."""
@@ -62,11 +62,12 @@ def shared_scatter(
     sharing = list(runs)
     while len(sharing) > 1:
         extra, left, free = _learned(put, sharing, known)
-        apart = [n for n in sharing if _has_its_own(runs[n], extra, left[n], free[n])]
-        if not apart:
+        leftovers = {n: _LeftOver(runs[n].scatter, left[n], free[n]) for n in sharing}
+        gains = {n: _gain_of_parting(leftovers, n, extra) for n in sharing}
+        first = max(sharing, key=gains.__getitem__)
+        if gains[first] <= 0.0:
             return dict.fromkeys(sharing, extra)
-        # The one that scatters most first: it alone may make the scatter too large for the others.
-        sharing.remove(max(apart, key=lambda n: _excess(runs[n], extra, left[n], free[n])))
+        sharing.remove(first)
     return {}
 
 
@@ -113,35 +114,47 @@ def _left_over(
     return left, free
 
 
-def _has_its_own(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> bool:
-    """Whether what a run leaves over is so much likelier in a scatter of its own."""
-    counts = _counted(rows)
-    better = _log_likelihood(rows, _alone(rows, extra, left, free), left, free, counts)
-    better -= _log_likelihood(rows, extra, left, free, counts)
-    return better > 0.5 * len(extra) * float(np.log(max(free[counts].sum(), 2.0)))
+@dataclass(frozen=True)
+class _LeftOver:
+    """What an estimate leaves over of the equations of some runs."""
+
+    scatter: RunScatter
+    left: Floats
+    """Residuals (SI), shape (m,)."""
+    free: Floats
+    """Redundancy of each equation (1), shape (m,)."""
+
+    @property
+    def counts(self) -> Bools:
+        """Equations whose scatter is learned, shape (m,)."""
+        return np.asarray(self.scatter.measured & (self.scatter.kind != WHOLE))
+
+    def likeliest(self, extra: Floats) -> Floats:
+        """Sigmas that make the squares as many as the redundancies, shape (3,), found from `extra` on."""
+        for _ in range(_MOST_STEPS):
+            before, extra = extra, learned(self.scatter, extra, self.left, self.free)
+            if np.all(np.abs(extra - before) <= _STANDS * extra + 1e-12):
+                break
+        return extra
+
+    def log_likelihood(self, extra: Floats) -> float:
+        """Log-likelihood (1), each equation counted by its redundancy."""
+        counts = self.counts
+        variance = self.scatter.sigmas(extra)[counts] ** 2
+        return -0.5 * float(np.sum(self.free[counts] * np.log(variance) + self.left[counts] ** 2 / variance))
 
 
-def _excess(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> float:
-    """Squares of what a run leaves over, per redundancy (1)."""
-    counts = _counted(rows)
-    return float(np.sum((left / rows.scatter.sigmas(extra))[counts] ** 2) / max(free[counts].sum(), 1.0))
+def _gain_of_parting(leftovers: Mapping[str, _LeftOver], name: str, extra: Floats) -> float:
+    """Log odds (1) that one run has a scatter of its own, and all others share theirs, against one of all in `extra`.
 
-
-def _counted(rows: RunRows) -> Bools:
-    """Equations whose scatter is learned, shape (m,)."""
-    return np.asarray(rows.scatter.measured & (rows.scatter.kind != WHOLE))
-
-
-def _alone(rows: RunRows, extra: Floats, left: Floats, free: Floats) -> Floats:
-    """Sigmas that make the squares of one run as many as its redundancies, shape (3,)."""
-    for _ in range(_MOST_STEPS):
-        before, extra = extra, learned(rows.scatter, extra, left, free)
-        if np.all(np.abs(extra - before) <= _STANDS * extra + 1e-12):
-            break
-    return extra
-
-
-def _log_likelihood(rows: RunRows, extra: Floats, left: Floats, free: Floats, counts: Bools) -> float:
-    """Log-likelihood of what is left over, each equation counted by its redundancy."""
-    variance = rows.scatter.sigmas(extra)[counts] ** 2
-    return -0.5 * float(np.sum(free[counts] * np.log(variance) + left[counts] ** 2 / variance))
+    The others count, too: in the scatter of a run that is so wild that it makes that of all, none is likely.
+    """
+    one, others = leftovers[name], [o for n, o in leftovers.items() if n != name]
+    rest = _LeftOver(
+        stacked_scatters([o.scatter for o in others]),
+        np.concatenate([o.left for o in others]),
+        np.concatenate([o.free for o in others]),
+    )
+    apart = sum(part.log_likelihood(part.likeliest(extra)) for part in (one, rest))
+    together = sum(part.log_likelihood(extra) for part in (one, rest))
+    return apart - together - 0.5 * len(extra) * float(np.log(max(one.free[one.counts].sum(), 2.0)))
