@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from sdimu_calibration.core.note import Topic, topic_of
+
 RANDOM_WALK = "random_walk"
 FLICKER = "flicker"
 MARKOV = "markov"
@@ -116,11 +118,14 @@ def may_be_an_effect(terms: Sequence[NoiseTerm]) -> bool:
     return any(term.kind not in {FLICKER, RANDOM_WALK} for term in terms)
 
 
-def unexplained(terms: Sequence[NoiseTerm], fault_kinds: Iterable[str] = ()) -> tuple[NoiseTerm, ...]:
+def unexplained(
+    terms: Sequence[NoiseTerm], fault_kinds: Iterable[str] = (), notes: Iterable[str] = ()
+) -> tuple[NoiseTerm, ...]:
     """Return the terms that no sensor has by itself: a cause that the model lacks is behind them.
 
     A calibration and a diagnosis judge the noise of their model by this alone. Wrong samples in turns leave noise that
-    looks drawn anew in each turn, so that where single samples were wrong nothing follows.
+    looks drawn anew in each turn, so that where single samples were wrong nothing follows. So does a clock: what a
+    stamp is late by turns the IMU by its rate, and of the gyros nothing follows where the stamps jitter.
 
     Parameters
     ----------
@@ -128,8 +133,14 @@ def unexplained(terms: Sequence[NoiseTerm], fault_kinds: Iterable[str] = ()) -> 
         That were learned beside the model.
     fault_kinds : iterable of str
         Kinds of the faults of the recording, as in `DataFault`.
+    notes : iterable of str
+        Of the recording.
     """
-    return () if "spike" in fault_kinds else tuple(term for term in terms if term.is_drawn)
+    if "spike" in fault_kinds:
+        return ()
+    evened = any(topic_of(note) == Topic.EVENED for note in notes)
+    clock = {("gyro", TURN)} if evened else set()
+    return tuple(term for term in terms if term.is_drawn and (term.triad, term.kind) not in clock)
 
 
 def sensors_of(triad: str, axes: tuple[int, ...]) -> str:

@@ -19,6 +19,7 @@ from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_tex
 from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps
 from sdimu_calibration.core.data.strays import strays, strays_note
 from sdimu_calibration.core.data.streams import one_stream
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import (
     UNNUMBERED,
@@ -244,7 +245,7 @@ def in_order(raw: RawTest) -> Recording:
     raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    notes = [*outside, *streams, *([] if bursts is None else [str(bursts)]), *arranged.notes]
+    notes = [*outside, *streams, *([] if bursts is None else [Note(str(bursts), Topic.EVENED)]), *arranged.notes]
     # Samples that are all there and in order are not copied.
     rows = arranged.rows if any(arranged.counts.values()) else slice(None)
     ns = stamps[rows]

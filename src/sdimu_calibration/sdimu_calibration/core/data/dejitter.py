@@ -17,6 +17,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.blocks import pieces
+from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import Recording
 
 _DOUBT = 0.25
@@ -67,13 +68,18 @@ def dejittered(recording: Recording) -> Recording:
         found = _told_by_samples(recording)
         if found is None:
             note = f"{measured}: too much to tell even sampling from missing samples; the stamps stay as they are"
-            return replace(recording, notes=(*recording.notes, note))
+            return _noted(recording, recording.t, note)
         measured = _in_words(float(np.sqrt(np.mean(found**2))), interval)
         note = f"{measured}: samples of turns follow an even clock and not the stamps, so their count is the clock"
-        return replace(recording, t=t - found, notes=(*recording.notes, note))
+        return _noted(recording, t - found, note)
     even = t - jitter
     note = f"{measured}: samples are taken as even, and their count as the clock"
-    return replace(recording, t=even, notes=(*recording.notes, note))
+    return _noted(recording, even, note)
+
+
+def _noted(recording: Recording, t: Floats, note: str) -> Recording:
+    """Give the samples other times, and say so."""
+    return replace(recording, t=t, notes=(*recording.notes, Note(note, Topic.EVENED)))
 
 
 def _in_words(rms: float, interval: float) -> str:

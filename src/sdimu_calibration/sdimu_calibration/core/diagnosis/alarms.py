@@ -73,7 +73,7 @@ def alarms(
         # What was added must also predict: an effect that only mimics the missing one fits here and fails elsewhere.
         Alarm.HELD_OUT: not base.learns_scatter and held_out_judged(after) > STILL_WRONG,
         Alarm.NIS: excess > largest_misfit(float(np.fmax(degrees_of_freedom(after), 1.0))),
-        Alarm.DRAWN: bool(unexplained(noise, [finding.kind for finding in findings])),
+        Alarm.DRAWN: bool(unexplained(noise, [finding.kind for finding in findings], base.test.recording.notes)),
         Alarm.PATCHWORK: patchwork(done.chosen),
     }
     return frozenset(alarm for alarm, rung in rings.items() if rung)

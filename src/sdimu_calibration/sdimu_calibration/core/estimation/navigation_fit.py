@@ -429,7 +429,7 @@ class NavigationFit(Fit):
             told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
             told += self._noise_in_words(nis)
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
-        elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults]):
+        elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults], self.test.recording.notes):
             out.append(not_of_sensors(odd))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
