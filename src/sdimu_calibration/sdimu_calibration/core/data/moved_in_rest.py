@@ -19,6 +19,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.epochs import Epochs
 from sdimu_calibration.core.data.phases import Phases, table_says
 from sdimu_calibration.core.data.windows import runs
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault, PhaseLog
 from sdimu_calibration.core.specification import EPOCH_S, ImuSpecification
 from sdimu_calibration.core.units import from_si
@@ -37,6 +38,8 @@ _APART = 0.5
 alike."""
 _TURNS = 4.0
 """Rate of a second in which the IMU moved (sigma of those at rest): one in ten thousand at rest has more."""
+_EPS_S = 1e-6
+"""Difference of two times (s) that are one: stamps are rounded to it."""
 _Q90 = 1.645
 """Size that nine of ten normal values are below (sigma): values of pulses are often alike, and have no median."""
 
@@ -54,7 +57,7 @@ class _Tilts:
 
 
 def without_tilts(
-    epochs: Epochs, log: PhaseLog | None, phases: Phases, imu: ImuSpecification
+    epochs: Epochs, log: PhaseLog | None, phases: Phases, imu: ImuSpecification, settle_s: float
 ) -> tuple[Phases, tuple[DataFault, ...]]:
     """Take the seconds out of rests in which both triads show that the IMU tilted; what follows is another stop.
 
@@ -62,6 +65,8 @@ def without_tilts(
     ----------
     imu : ImuSpecification
         Gives the least noise of both triads.
+    settle_s : float
+        No measurement for this long after motion (s).
 
     Returns
     -------
@@ -75,22 +80,30 @@ def without_tilts(
         return phases, ()
     dwell = phases.dwell & ~moved
     ends = np.flatnonzero(moved[:-1] & dwell[1:]) + 1
-    first = phases.first & dwell
     used = phases.used & dwell
+    for end in ends.tolist():
+        used &= (epochs.start < epochs.start[end]) | (epochs.start >= epochs.start[end] + settle_s - _EPS_S)
+    first = phases.first & used
     # The first measurement after motion tells velocity and place, too.
-    behind = np.searchsorted(np.flatnonzero(used), ends)
-    first[np.flatnonzero(used)[behind[behind < used.sum()]]] = True
+    at = np.flatnonzero(used)
+    behind = np.searchsorted(at, ends)
+    first[at[behind[behind < len(at)]]] = True
     silent = table_says(epochs, log)[1] < 0
     begins = np.zeros(len(epochs), dtype=np.int64)
     begins[ends] = 1
     stop = phases.stop + np.where(silent, np.cumsum(begins), 0)
-    at = np.flatnonzero(moved)
+    return replace(phases, dwell=dwell, used=used, first=first, stop=stop), (_told(epochs, moved, len(ends), largest),)
+
+
+def _told(epochs: Epochs, moved: Bools, times: int, largest: float) -> DataFault:
+    """Say when the IMU moved, and by how much at most (rad)."""
+    seconds = np.flatnonzero(moved)
+    begin, end = float(epochs.start[seconds[0]]), float(epochs.end[seconds[-1]])
     text = (
-        f"the IMU tilted within {len(ends) or 1} of its rests, by up to {from_si(largest, 'arcsec'):.0f} arcsec (first "
-        f"at {epochs.start[at[0]]:.0f} s): gyros and accelerometers agree; these {len(at)} s are taken as motion"
+        f"the IMU tilted {counted(times, 'time')} within its rests, by up to {from_si(largest, 'arcsec'):.0f} arcsec "
+        f"(first at {begin:.0f} s): gyros and accelerometers agree; these {len(seconds)} s are taken as motion"
     )
-    fault = DataFault("motion at rest", text, len(at), float(epochs.start[at[0]]), float(epochs.end[at[-1]]))
-    return replace(phases, dwell=dwell, used=used, first=first, stop=stop), (fault,)
+    return DataFault("motion at rest", text, len(seconds), begin, end)
 
 
 def _moved(epochs: Epochs, dwell: Bools, imu: ImuSpecification) -> tuple[Bools, float]:
