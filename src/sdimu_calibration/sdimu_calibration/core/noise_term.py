@@ -138,8 +138,8 @@ def unexplained(
     """
     if "spike" in fault_kinds:
         return ()
-    evened = any(topic_of(note) == Topic.EVENED for note in notes)
-    clock = {("gyro", TURN)} if evened else set()
+    jitters = any(topic_of(note) == Topic.JITTER for note in notes)
+    clock = {("gyro", TURN)} if jitters else set()
     return tuple(term for term in terms if term.is_drawn and (term.triad, term.kind) not in clock)
 
 

@@ -19,8 +19,8 @@ class Topic(StrEnum):
     """The file of the IMU is of one of another grade."""
     INSEPARABLE = auto()
     """Two coefficients are one in a test."""
-    EVENED = auto()
-    """The stamps jitter or come in bursts, and the samples are taken as even."""
+    JITTER = auto()
+    """The stamps jitter or come in bursts, whether the samples are taken as even or not."""
 
 
 MISFITS = frozenset({Topic.MISFIT, Topic.DIFFERS})

@@ -26,7 +26,7 @@ def test_jitter_is_taken_away_and_gaps_and_drift_stay(seed):
     true = true + 1e-3 * np.sin(2.0 * np.pi * true / 200.0) + 1e-5 * true
     found = dejittered(recording(true + rng.uniform(-1e-3, 1e-3, len(true))))
     assert "jitter" in found.notes[0]
-    assert topic_of(found.notes[0]) == Topic.EVENED
+    assert topic_of(found.notes[0]) == Topic.JITTER
     error = found.t - true
     # A mean over 4000 samples leaves a sixtieth of the jitter (0.6 ms rms); at the ends fewer can be averaged.
     inside = slice(3000, -3000)

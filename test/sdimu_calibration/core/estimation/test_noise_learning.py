@@ -22,5 +22,5 @@ def test_of_gyros_in_turns_nothing_follows_where_stamps_jitter():
     in_turns, forces, at_stops = NoiseTerm("gyro", TURN), NoiseTerm("accel", TURN), NoiseTerm("gyro", STOP)
     terms = (in_turns, forces, at_stops)
     assert unexplained(terms) == terms
-    assert unexplained(terms, (), [Note("samples are taken as even", Topic.EVENED)]) == (forces, at_stops)
+    assert unexplained(terms, (), [Note("samples are taken as even", Topic.JITTER)]) == (forces, at_stops)
     assert unexplained(terms, ["spike"]) == ()

@@ -245,7 +245,7 @@ def in_order(raw: RawTest) -> Recording:
     raw = _without_steps(raw, steps)
     stamps = raw.ns if bursts is None else bursts.ns
     arranged = arrange(stamps, raw.omega_ib_b, raw.f_ib_b, raw.where)
-    notes = [*outside, *streams, *([] if bursts is None else [Note(str(bursts), Topic.EVENED)]), *arranged.notes]
+    notes = [*outside, *streams, *([] if bursts is None else [Note(str(bursts), Topic.JITTER)]), *arranged.notes]
     # Samples that are all there and in order are not copied.
     rows = arranged.rows if any(arranged.counts.values()) else slice(None)
     ns = stamps[rows]

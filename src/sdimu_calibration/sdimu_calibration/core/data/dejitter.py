@@ -79,7 +79,7 @@ def dejittered(recording: Recording) -> Recording:
 
 def _noted(recording: Recording, t: Floats, note: str) -> Recording:
     """Give the samples other times, and say so."""
-    return replace(recording, t=t, notes=(*recording.notes, Note(note, Topic.EVENED)))
+    return replace(recording, t=t, notes=(*recording.notes, Note(note, Topic.JITTER)))
 
 
 def _in_words(rms: float, interval: float) -> str:
