@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
+from sdimu_calibration.core.data.windows import runs
 from sdimu_calibration.core.recording import Recording
 
 _LEAST_IN_A_ROW = 3
@@ -39,9 +40,7 @@ def _readings_each(x: Floats) -> int:
 
 def _in_a_row(flags: Bools, least: int) -> Bools:
     """Keep runs of `least` and more."""
-    edge = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    first, last = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
     out = np.zeros(len(flags), dtype=bool)
-    for a, b in zip(first, last, strict=True):
+    for a, b in zip(*runs(flags), strict=True):
         out[a:b] = b - a >= least
     return out
