@@ -402,3 +402,16 @@ def trembling(
     from sdimu_study.trembling import CASES, STUDY
 
     conduct_as_table(STUDY, CASES, range(seed, seed + runs), out, workers)
+
+
+@app.command()
+def parts(
+    out: Annotated[Path, typer.Option(help="Folder of runs and parts.json.")] = Path("out/study-parts"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Runs of each IMU file.")] = 60,
+    seed: Seed = 94_001,
+    workers: Workers = 2,
+) -> None:
+    """Calibrate runs by hand cut in parts of few rests as sets: in one scatter, and each part in its own."""
+    from sdimu_study.parts import CASES, STUDY
+
+    conduct_as_table(STUDY, CASES, range(seed, seed + runs), out, workers)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.handheld.run_scatter import FORCE
-from sdimu_calibration.core.joint.member import Job, Member, tried
+from sdimu_calibration.core.joint.member import Job, tried
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
-from sdimu_sim.core.by_hand import ByHand, by_hand_motion, by_hand_recording
-from sdimu_study.static_world import Opened
+from sdimu_sim.core.by_hand import ByHand
+from sdimu_study.parts import parts as cut
 
 from .conftest import here
 
@@ -27,31 +24,8 @@ ALIKE = to_si(200.0, "ug")
 
 
 def parts(seed, rests, scatter):
-    """Cut a run by hand in parts of some rests each, the forces at each rest off by a scatter (m/s^2) of the part."""
-    run = ByHand(sum(rests), IMU, Site(np.radians(45.0)), seed=seed)
-    recording, _ = by_hand_recording(run)
-    motion = by_hand_motion(run)
-    still = ~motion.omega_nt_t.any(axis=1)
-    rest = np.flatnonzero(still[:-1] & still[1:])
-    begin, end = motion.t[rest], motion.t[rest + 1]
-    part = np.repeat(np.arange(len(rests)), rests)
-    off = np.random.default_rng(seed).standard_normal((len(rest), 3)) * np.asarray(scatter)[part, None]
-    nearest = np.searchsorted(0.5 * (end[:-1] + begin[1:]), recording.t)
-    forces = recording.f_ib_b + off[nearest]
-    cuts = [0.0, *(0.5 * (end[:-1] + begin[1:])[np.flatnonzero(np.diff(part))]).tolist(), np.inf]
-    return [_cut(replace(recording, f_ib_b=forces), k, *cuts[k : k + 2], run.site) for k in range(len(rests))]
-
-
-def _cut(recording, number, begin, end, site):
-    rows = (recording.t > begin) & (recording.t <= end)
-    own = replace(
-        recording,
-        start_ns=recording.start_ns + round(begin * 1e9),
-        t=recording.t[rows] - begin,
-        omega_ib_b=recording.omega_ib_b[rows],
-        f_ib_b=recording.f_ib_b[rows],
-    )
-    return Member(f"part {number}", Opened(PreparedTest(own, IMU, site=site)), power_on="one")
+    """Parts of a run by hand, the forces at each rest off by a scatter (m/s^2) of the part."""
+    return cut(ByHand(sum(rests), IMU, Site(np.radians(45.0)), seed=seed), rests, scatter)[0]
 
 
 @pytest.fixture(scope="module")
@@ -93,15 +67,14 @@ def test_a_part_that_scatters_otherwise_keeps_its_own():
     fit = fit_set(parts(5, (20, 20, 20), (0.1 * ALIKE, 0.1 * ALIKE, 10.0 * ALIKE)), OPTIONS, here)
     quiet, also, wild = fit.reports
     np.testing.assert_array_equal(quiet.scatter, also.scatter)
-    assert wild.scatter is None
     told = [note for note in set_outcome(fit).notes if "beyond white noise" in note]
     assert [note.split(":")[0] for note in told] == ["part 0, part 1", "part 2"]
     assert quiet.scatter[FORCE] < ALIKE < wild.by_hand.extra[FORCE]
 
 
-def test_a_wild_part_that_makes_the_scatter_of_all_parts_first():
-    fit = fit_set(parts(6, (8, 8, 8, 8), (0.1 * ALIKE, 0.1 * ALIKE, 0.1 * ALIKE, 20.0 * ALIKE)), OPTIONS, here)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_wild_part_that_makes_the_scatter_of_all_parts_from_them(seed):
+    """By its own likelihood alone it stayed: the scatter of all was nearly its own."""
+    fit = fit_set(parts(seed, (7, 7, 7), (0.3 * ALIKE, 0.3 * ALIKE, 3.0 * ALIKE)), OPTIONS, here)
     *quiet, wild = fit.reports
-    assert wild.scatter is None
-    assert all(one.scatter is not None for one in quiet)
-    assert max(one.scatter[FORCE] for one in quiet) < ALIKE
+    assert max(one.scatter[FORCE] for one in quiet) < ALIKE < wild.scatter[FORCE]
