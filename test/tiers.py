@@ -26,6 +26,7 @@ THOROUGH = {
 
 LONG = {
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py": (
+        "test_an_effect_is_found_where_noise_that_follows_the_rate_took_it_up",
         "test_no_physics_is_named_for_what_moves_within_stretches",
     ),
     "test/sdimu_calibration/core/joint/test_changed.py": (

@@ -88,17 +88,38 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     done : Round
         As of `search_until_stable`.
     """
-    request, done = search_until_stable(request, progress)
+    ground = _first_ground(request, progress)
+    progress("candidates", 0.4)
+    first = run_round(request, ground, False, {}, None)
+    within = _moving_within(request, first)
+    if within is not None:
+        return search_until_stable(within, _first_ground(within, progress), None, progress)
+    request, done = search_until_stable(request, ground, first, progress)
+    within = _moving_within(request, done)
+    if within is None:
+        return request, done
+    return search_until_stable(within, _first_ground(within, progress), None, progress)
+
+
+def _moving_within(request: Request, done: Round) -> Request | None:
+    """Return the request in noise that moves within stretches; None where the noise of a round does not."""
     if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
-        return request, done
+        return None
     wander = wander_in(request.base.bare, done.found.noise)
-    if wander.inner is None:
-        return request, done
-    return search_until_stable(replace(request, wander=wander), progress)
+    return None if wander.inner is None else replace(request, wander=wander)
 
 
-def search_until_stable(request: Request, progress: Progress) -> tuple[Request, Round]:
+def search_until_stable(
+    request: Request, ground: Ground, first: Round | None, progress: Progress
+) -> tuple[Request, Round]:
     """Repeat rounds until the choice stands, then fit it in its noise.
+
+    Parameters
+    ----------
+    ground : Ground
+        Of the first round.
+    first : Round, optional
+        The first round, where it was run already.
 
     Returns
     -------
@@ -107,14 +128,13 @@ def search_until_stable(request: Request, progress: Progress) -> tuple[Request, 
     done : Round
         The last one; its fit holds what it chose.
     """
-    ground = _first_ground(request, progress)
     own, asked, stood = False, False, False
-    limits: dict[bool, float] = {}
+    limits = {} if first is None else {False: first.found.threshold}
     done: Round | None = None
     for turn in range(MOST_ROUNDS):
         beside = False
         progress("candidates", min(0.8, 0.4 + 0.1 * turn))
-        done = run_round(request, ground, own, limits, done)
+        done = first if first and not turn else run_round(request, ground, own, limits, done)
         if done.wants_equations and not own and not asked:
             asked = True
             progress("equations", min(0.8, 0.45 + 0.1 * turn))

@@ -7,7 +7,7 @@ share of the prior that lies where the likelihood does: so the best size stands 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product, repeat
 
@@ -81,6 +81,9 @@ _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
+_LIKE_EFFECTS = frozenset((*FOLLOWS, STOP, TURN, SHIFT))
+"""Kinds of noise that hang on attitude, rate, turns or temperature: an effect that is not in the model looks like
+them."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
 SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count))
@@ -110,6 +113,11 @@ class NoiseModel:
     def kinds(self) -> frozenset[Identity]:
         """What each term is, its size aside."""
         return frozenset(t.identity for t in self.terms)
+
+    @property
+    def wanders_alone(self) -> bool:
+        """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
+        return not any(t.kind in _LIKE_EFFECTS for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -192,13 +200,13 @@ class _Search:
             self.seen[found.noise.kinds] = found
         return found
 
-    def one_more(self, base: _Found) -> list[_Found]:
-        """Add each kind of noise to a noise, at its best size, where that is seen at all."""
+    def one_more(self, base: _Found, triads: Collection[str] = TRIADS) -> list[_Found]:
+        """Add each kind of noise of some triads to a noise, at its best size, where that is seen at all."""
         terms = base.noise.terms
         room = []
         for term in self.tried:
             own = _of_triad(NoiseModel(terms), term.triad)
-            if len(own) < _MOST_TERMS and not _is_in(term, own):
+            if term.triad in triads and len(own) < _MOST_TERMS and not _is_in(term, own):
                 room.append(term)
         given = {name: self.information.of_triad(name, terms, self.cut) for name in {t.triad for t in room}}
         alike: dict[tuple[str, str, float], list[NoiseTerm]] = {}
@@ -325,7 +333,8 @@ def explored(
     Returns
     -------
     list of (float, NoiseModel)
-        Log posterior of each over white noise (1), the likeliest first.
+        Log posterior of each over white noise (1), the likeliest first. The last one is far behind where all others
+        have terms that stand in the place of effects: it is the likeliest without them.
     """
     search = _Search(information, cut, usual, tried)
     best = search.keep(_Found(NoiseModel(), 0.0))
@@ -341,12 +350,17 @@ def explored(
             else max(search.settled(option.noise.terms), option, key=lambda found: found.score)
         )
     for _ in range(_MOST_STEPS):
-        for place in range(len(best.noise.terms)):
+        for place, term in enumerate(best.noise.terms):
             if len(best.noise.terms) > 1:
-                search.one_more(search.settled([t for k, t in enumerate(best.noise.terms) if k != place]))
+                others = search.settled([t for k, t in enumerate(best.noise.terms) if k != place])
+                # Nothing in the other triad takes the place of a term: `crossed` puts the triads together.
+                search.one_more(others, (term.triad,))
         if not search.best().score > best.score + _SETTLED:
             break
         best = search.settled(search.best().noise.terms)
     search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
-    return [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
+    near = [found for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
+    if not any(found.noise.wanders_alone for found in near):
+        near.append(next(found for found in ranked if found.noise.wanders_alone))
+    return [(found.score, found.noise) for found in near]

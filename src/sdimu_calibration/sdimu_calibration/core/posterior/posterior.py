@@ -39,6 +39,9 @@ _TIE = 0.5
 same would go to and fro."""
 _HOPEFUL = 15.0
 """Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
+_FAR = 30.0
+"""Log posterior (1) behind the best model from which effects in the noises that are known are looked at no further: a
+kind of noise that is known beside no others adds less."""
 _MOST_SHARPENED = 20
 """Number of times or time constants that are put between those of the scan at most: each takes a climb."""
 _FEW = 2
@@ -375,25 +378,34 @@ def _climbed(
     known: list[tuple[float, NoiseModel, Members]] = []
     start = starts[0]
     white = board.data(NoiseModel())[1]
-    best, members = max(
-        (best_from(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0]
-    )
+    if settled and tried:
+        # What white noise asks for beside noise that is probable are no effects.
+        best, members = white.at(start).score, start
+    else:
+        best, members = max(
+            (best_from(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0]
+        )
     for _ in range(_ROUNDS):
         if members in asked:
             break
         beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
-        for one in dict.fromkeys(beside):
+        # Few effects first: beside many that white noise asked for, noise that is far behind is given up at once.
+        for one in sorted(dict.fromkeys(beside), key=len):
             if one in asked:
                 continue
-            asked[one] = board.noises(one, tried, best)
+            asked[one] = _noises_beside(board, one, tried, best, [noise for _, noise, _ in known])
             for score, noise in asked[one]:
                 _add(known, score, noise, one)
                 best = max(best, score)
         # Beside effects that are no model in that noise a noise may be better than all models: it counts no further.
         hopeful = min(best, max(score for score, _, _ in known)) - _HOPEFUL
-        near = [found for found in known if found[0] >= hopeful]
+        ranked = sorted(known, key=lambda found: -found[0])
+        near = [found for found in ranked if found[0] >= hopeful][:_NOISES]
+        if not any(noise.wanders_alone for _, noise, _ in near):
+            # Noise that hangs on attitude or rate took up what may be an effect, which is seen only without that noise.
+            near += [found for found in ranked if found[1].wanders_alone][:1]
         known = []
-        for _, noise, one in sorted(near, key=lambda found: -found[0])[:_NOISES]:
+        for _, noise, one in near:
             offset, data = board.data(noise)
             trials = [best_from(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
             gain, found = max(trials, key=lambda t: t[0])
@@ -409,6 +421,18 @@ def _climbed(
     if members not in asked:
         asked[members] = board.noises(members, tried, best)
     return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members, asked[members]
+
+
+def _noises_beside(
+    board: Board[E], members: Members, tried: Sequence[NoiseTerm] | None, best: float, known: Sequence[NoiseModel]
+) -> list[tuple[float, NoiseModel]]:
+    """Noises beside effects; of kinds that are `known` beside others alone where these leave them far behind."""
+    if tried is None and known:
+        kinds = list({t.identity: t for noise in known for t in noise.terms}.values())
+        found = board.noises(members, kinds, best)
+        if max((score for score, _ in found), default=-np.inf) < best - _FAR:
+            return found
+    return board.noises(members, tried, best)
 
 
 def _in_same_noise(
