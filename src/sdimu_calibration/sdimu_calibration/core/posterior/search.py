@@ -133,9 +133,15 @@ def window(
                 total += _weight(found[key] - first)
                 heapq.heappush(waiting, (-found[key], key))
                 best = max(best, found[key])
-    found = {key: score for key, score in found.items() if _holds(data[key[0]], key[1])}
-    best = max(found.values())
-    return {key: score for key, score in found.items() if score > best - WINDOW}
+    ranked = sorted(found.items(), key=lambda item: -item[1])
+    kept: dict[tuple[int, Members], float] = {}
+    for (number, members), score in ranked:
+        # The first one that is a model is the best: what is far behind it need not be looked at.
+        if kept and score <= next(iter(kept.values())) - WINDOW:
+            break
+        if _holds(data[number], members):
+            kept[number, members] = score
+    return kept
 
 
 def _weight(score: float) -> float:
