@@ -54,6 +54,22 @@ def test_a_half_moves_against_the_other_by_the_allan_variance():
     assert moves_within(wander, [NoiseTerm("gyro", "stop", size=9.0)]) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_what_a_tilt_takes_of_the_mean_hides_no_movement():
+    """The mean of an accelerometer over a stretch is a tilt; the difference of its halves is none."""
+
+    class Tilting(Ideal):
+        def constant_signature(self, cut):
+            U = super().constant_signature(cut).astype(float)
+            # Beside a tilt that is free in each rest.
+            for k in range(10):
+                own = np.kron((np.arange(1200) // 120 == k).astype(float)[:, None], np.eye(6)[:, 3:])
+                U -= own @ np.linalg.lstsq(own, U, rcond=None)[0]
+            return U
+
+    walk = NoiseTerm("accel", "random_walk", size=0.1)
+    assert moves_within(Wander.of(Tilting()), [walk]) == pytest.approx(moves_within(Wander.of(Ideal()), [walk]))
+
+
 def test_stretches_are_halved_where_noise_moves_within_them():
     few, many = (len(stretches(Ideal().times, share)) for share in (1.0, 0.5))
     assert (few, many) == (40, 80)

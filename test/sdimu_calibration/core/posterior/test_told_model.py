@@ -95,6 +95,6 @@ def test_a_family_is_as_sure_as_that_so_many_of_it_are_there():
 
 def test_the_next_search_begins_with_the_likeliest_model_in_each_noise():
     # Noise with a memory makes the effect unnecessary: about the next point that must be asked again.
-    walk = NoiseModel((NoiseTerm("gyro", "random_walk", size=1e-6),), -1.0)
+    walk = NoiseModel((NoiseTerm("gyro", "random_walk", size=1e-6),), (-1.0,))
     found = window(((SHORT,), 0.6), ((), 0.39), ((OTHER,), 0.01), noises=(NoiseModel(), walk, NoiseModel(())))
     assert found.starts() == [{KEYS[SHORT]: (0, False)}, {KEYS[SHORT]: (0, False)}, {}]

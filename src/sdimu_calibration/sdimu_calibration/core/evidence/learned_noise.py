@@ -72,9 +72,11 @@ _INTERVAL = 1.92
 """Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
 _BLOCK = 60
 """Number of columns that are multiplied at a time: of a hundred stretches a tenth, which begin at nearly one time."""
+_LOOKED_AT = 12
+"""Number of stretches at rest of which the halves are compared: those of one test are much alike."""
 _SHORTEST_TAU = 0.2
 """Ratio of the shortest time constant that is tried to a stretch: faster noise is white from stretch to stretch."""
-_TAUS = 8
+TIMES = 8
 """Number of time constants that are tried, up to a third of the test: neighbours differ by less than an interval."""
 
 
@@ -105,6 +107,10 @@ class Wander:
     """In which U is whitened, and an evidence must be that goes with it."""
     plain: Wander | None = None
     """The same in white noise, where there is an `inner`."""
+    halves: Floats = field(default_factory=lambda: np.zeros(6))
+    """Information on the difference between the halves of a stretch at rest, in the middle of stretches (inverse
+    squares of the units, SI), shape (6,). An accelerometer's mean error over a stretch is a tilt, and the data hardly
+    show it; they show all of what changes within the stretch."""
     _last: dict[Hashable, Modes] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Modes of the noise that was asked for last: a fit is taken back to it again and again."""
 
@@ -165,7 +171,7 @@ class Wander:
         """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
         cut = stretches(evidence.times, share)
         cut = replace(cut, conditions=evidence.conditions(cut))
-        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner)
+        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner, halves=between_halves(evidence, cut))
 
     def with_functions(self, evidence: LinearEvidence) -> Wander:
         """Return the same with functions of the attitude behind its stretches; itself where nobody knows that.
@@ -197,6 +203,33 @@ class Wander:
         seen = values > _SEEN
         hidden = mean[:, ~seen]
         return Modes(self.U @ (root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
+
+
+def between_halves(evidence: LinearEvidence, cut: Stretches) -> Floats:
+    """Work out what the data say of the difference between the halves of a stretch at rest.
+
+    Parameters
+    ----------
+    cut : Stretches
+        Of the test; some of its rests, spread over the test, are looked at.
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        Information on the difference for each sensor, the median of stretches (inverse squares of the units, SI); zero
+        where the IMU never rests.
+    """
+    rests = np.flatnonzero(~cut.turning)
+    if not len(rests):
+        return np.zeros(6)
+    some = rests[np.unique(np.linspace(0, len(rests) - 1, min(len(rests), _LOOKED_AT)).round().astype(int))]
+    middle = 0.5 * (cut.start[some] + cut.end[some])
+    start = np.column_stack([cut.start[some], middle]).ravel()
+    end = np.column_stack([middle, cut.end[some]]).ravel()
+    halves = Stretches(start, end, np.repeat(cut.interval[some], 2), np.zeros(len(start), dtype=bool))
+    U = evidence.constant_signature(halves).reshape(-1, len(some), 2, 6)
+    change = 0.5 * (U[:, :, 1] - U[:, :, 0])
+    return np.asarray(np.median(np.einsum("nsc,nsc->sc", change, change), axis=0))
 
 
 @dataclass(frozen=True)
@@ -358,7 +391,7 @@ def kinds(cut: Stretches) -> list[NoiseTerm]:
     """List the terms that are tried: every kind in each triad, Markov noise with several time constants."""
     shortest = _SHORTEST_TAU * float(np.median(cut.end - cut.start))
     longest = max(float(cut.end[-1]) / 3.0, 2.0 * shortest)
-    taus = [float(f"{tau:.3g}") for tau in np.geomspace(shortest, longest, _TAUS)]
+    taus = [float(f"{tau:.3g}") for tau in np.geomspace(shortest, longest, TIMES)]
     out = []
     for triad in TRIADS:
         out += [NoiseTerm(triad, kind) for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT)]

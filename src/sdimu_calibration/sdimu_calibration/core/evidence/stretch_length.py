@@ -84,13 +84,10 @@ def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:
     length = float(np.median((cut.end - cut.start)[~cut.turning]))
     edges = np.array([0.0, 0.5, 1.0]) * length
     halves = Stretches(edges[:2], edges[1:], np.zeros(2, dtype=np.int64), np.zeros(2, dtype=bool))
-    U = wander.U[:, : 6 * len(cut)]
-    seen = np.einsum("ij,ij->j", U, U).reshape(len(cut), 2, 3)[~cut.turning]
     ratios = []
-    for place, triad in enumerate(TRIADS):
+    for triad, seen in zip(TRIADS, wander.halves.reshape(2, 3), strict=True):
         moved = sum(t.size**2 * _between(kernel(t.kind, t.tau, halves)) for t in terms if t.triad == triad)
-        # White noise of each half has twice the variance of the stretch's mean, their difference four times.
-        ratios.append(moved * float(np.median(seen[:, place])) / 4.0)
+        ratios.append(moved * float(np.median(seen)))
     return max(ratios)
 
 

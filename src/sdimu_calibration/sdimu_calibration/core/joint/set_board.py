@@ -12,15 +12,16 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.learned_noise import TIMES, Wander
 from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
 from sdimu_calibration.core.posterior.models import Members, gains
-from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, usual_sizes
 from sdimu_calibration.core.posterior.prior import Prior, prior_of, twins
 
 _NEAR = 6.0
@@ -41,6 +42,13 @@ class SetNoise(NoiseModel):
     """Place of each among the noises of its recording."""
     own: tuple[NoiseModel, ...] = ()
     """Of each recording, in the order of the reports."""
+    log_prior_of_all: float = 0.0
+    """Of all of them together, beside white noise in all (1)."""
+
+    @property
+    def log_prior(self) -> float:
+        """Log of the odds beside white noise in all recordings, of the share of the sizes too (1)."""
+        return self.log_prior_of_all
 
     @property
     def sizes(self) -> Mapping[Hashable, float]:
@@ -99,6 +107,7 @@ class SetBoard(Board[SetEvidence]):
         self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self._white = (0,) * len(self.rivals)
+        self._usual = usual_sizes(evidence.imu), log_odds(TIMES)
         self._told = len(evidence.weight) + np.arange(len(told))
         self.known = self._names[: len(evidence.weight) + len(told)]
 
@@ -169,14 +178,33 @@ class SetBoard(Board[SetEvidence]):
                 found[chosen] = self._likelihood(chosen, columns, weight) - white + self._noise(chosen).log_prior
             return found[chosen]
 
-        best = self._white
-        for _ in range(_SWEEPS):
-            before = best
-            for k, own in enumerate(self.rivals):
-                best = max((_changed(best, k, other) for other in range(len(own))), key=score)
-            if best == before:
-                break
+        def swept(best: tuple[int, ...]) -> tuple[int, ...]:
+            for _ in range(_SWEEPS):
+                before = best
+                for k, own in enumerate(self.rivals):
+                    best = max((_changed(best, k, other) for other in range(len(own))), key=score)
+                if best == before:
+                    break
+            return best
+
+        best = swept(self._white)
+        # No single recording may ask for noise that all of them have.
+        together = max(self._of_unit(best), key=score, default=best)
+        if score(together) > score(best):
+            swept(together)
         return found
+
+    def _of_unit(self, best: tuple[int, ...]) -> list[tuple[int, ...]]:
+        """Choices in which one kind of noise is in all recordings; each recording else as near `best` as it can."""
+        kinds = [[{kind_of(t) for t in one.noise.terms} for one in own] for own in self.rivals]
+        out = []
+        for kind in sorted(set.intersection(*(set().union(*own) for own in kinds))):
+            chosen = []
+            for own, place in zip(kinds, best, strict=True):
+                having = [j for j, one in enumerate(own) if kind in one]
+                chosen.append(min(having, key=lambda j: (len(own[j] ^ (own[place] | {kind})), j)))
+            out.append(tuple(chosen))
+        return out
 
     def squares(self, noise: NoiseModel) -> tuple[float, int]:
         """Sum of the squared residuals with no effect added, in a noise (1), and their number."""
@@ -229,7 +257,7 @@ class SetBoard(Board[SetEvidence]):
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
         own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=True))
         terms = tuple(t for noise in own for t in noise.terms)
-        return SetNoise(terms, sum(noise.log_prior for noise in own), chosen, own)
+        return SetNoise(terms, (), chosen, own, log_prior_of_set(own, *self._usual))
 
     def _chosen(self, noise: NoiseModel) -> tuple[int, ...]:
         return noise.chosen if isinstance(noise, SetNoise) else self._white

@@ -96,8 +96,13 @@ class NoiseModel:
 
     terms: tuple[NoiseTerm, ...] = ()
     """With their sizes."""
-    log_prior: float = 0.0
-    """Log of its odds beside white noise, of the share of its sizes too (1)."""
+    shares: tuple[float, ...] = ()
+    """Of each term the log of its odds beside none, with the share of the sizes that its likelihood leaves (1)."""
+
+    @property
+    def log_prior(self) -> float:
+        """Log of its odds beside white noise, of the share of its sizes too (1)."""
+        return sum(self.shares)
 
     @property
     def sizes(self) -> Mapping[Hashable, float]:
@@ -165,6 +170,18 @@ def usual_sizes(imu: ImuSpecification) -> Sizes:
     return Sizes(centre, spread)
 
 
+def log_odds(times: int) -> dict[str, float]:
+    """Log odds (1) of one term of each kind beside none.
+
+    Parameters
+    ----------
+    times : int
+        Number of time constants of Gauss-Markov noise that are tried.
+    """
+    variants = {MARKOV: times, **dict.fromkeys(FOLLOWS, len(SENSORS))}
+    return {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
+
+
 @dataclass(frozen=True)
 class _Found:
     """A noise, and its log-likelihood over white noise."""
@@ -188,9 +205,7 @@ class _Search:
         unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in SENSORS]
         every = [*kinds(cut), *unknown]
         self.tried = every if tried is None else list(tried)
-        markov = sum(t.kind == MARKOV for t in every) // len(TRIADS)
-        variants = {MARKOV: markov, **dict.fromkeys(FOLLOWS, len(SENSORS))}
-        self.log_odds = {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
+        self.log_odds = log_odds(sum(t.kind == MARKOV for t in every) // len(TRIADS))
         self.seen: dict[frozenset[Identity], _Found] = {}
 
     def keep(self, found: _Found) -> _Found:
@@ -214,7 +229,7 @@ class _Search:
             alike.setdefault(term.identity[:3], []).append(term)
         sized = side_by_side(lambda own: self._in_sensors(given[own[0].triad], own), alike.values())
         return [
-            self.keep(_Found(NoiseModel((*terms, term), base.noise.log_prior + share), base.gain + term.gain))
+            self.keep(_Found(NoiseModel((*terms, term), (*base.noise.shares, share)), base.gain + term.gain))
             for term, share in chain.from_iterable(sized)
         ]
 
@@ -251,17 +266,17 @@ class _Search:
 
         What each alternative costs beside the other triad's best terms adds.
         """
-        parts = {triad: _of_triad(best.noise, triad) for triad in TRIADS}
+        own = {triad: _kinds(_of_triad(best.noise, triad)) for triad in TRIADS}
         instead: dict[str, list[_Found]] = {triad: [] for triad in TRIADS}
         for found in self.seen.values():
-            apart = [triad for triad in TRIADS if _kinds(_of_triad(found.noise, triad)) != _kinds(parts[triad])]
+            apart = [triad for triad in TRIADS if _kinds(_of_triad(found.noise, triad)) != own[triad]]
             if len(apart) == 1 and found.score > best.score - _NEAR:
                 instead[apart[0]].append(found)
         gyro, accel = TRIADS
         for one, other in product(instead[gyro], instead[accel]):
-            terms = (*_of_triad(one.noise, gyro), *_of_triad(other.noise, accel))
-            log_prior = one.noise.log_prior + other.noise.log_prior - best.noise.log_prior
-            self.keep(_Found(NoiseModel(terms, log_prior), one.gain + other.gain - best.gain))
+            parts = [_alone(one.noise, gyro), _alone(other.noise, accel)]
+            noise = NoiseModel(parts[0].terms + parts[1].terms, parts[0].shares + parts[1].shares)
+            self.keep(_Found(noise, one.gain + other.gain - best.gain))
 
     def settled(self, terms: Sequence[NoiseTerm]) -> _Found:
         """Find the sizes of several terms together, each in turn until they stand; leave out what is no longer seen."""
@@ -291,7 +306,7 @@ class _Search:
             else:
                 sized[place] = again
                 gain += again[0].gain
-        noise = NoiseModel(tuple(found[0] for found in sized.values()), sum(found[1] for found in sized.values()))
+        noise = NoiseModel(tuple(found[0] for found in sized.values()), tuple(found[1] for found in sized.values()))
         return _Found(noise, gain)
 
     def best(self) -> _Found:
@@ -306,6 +321,12 @@ def _is_in(term: NoiseTerm, terms: Sequence[NoiseTerm]) -> bool:
 
 def _of_triad(noise: NoiseModel, triad: str) -> tuple[NoiseTerm, ...]:
     return tuple(t for t in noise.terms if t.triad == triad)
+
+
+def _alone(noise: NoiseModel, triad: str) -> NoiseModel:
+    """Noise of one triad."""
+    own = [(term, share) for term, share in zip(noise.terms, noise.shares, strict=True) if term.triad == triad]
+    return NoiseModel(tuple(term for term, _ in own), tuple(share for _, share in own))
 
 
 def _kinds(terms: Sequence[NoiseTerm]) -> frozenset[Identity]:

@@ -1,0 +1,79 @@
+"""Noise of the unit: of one size in all recordings of a set, or of its own in each.
+
+Noise comes from the sensors, and the sensors are the same in all recordings: what one recording hardly shows, all of
+them together may. So each kind of noise is of the unit or of single recordings, and both are weighed:
+
+    p = 1/2 prod_r p(K) p(s_r) + 1/2 p(K) int p(s) prod_r N(s_r; s, delta^2) ds
+
+with s_r the log of the size in recording r. The likelihood of a size is taken as normal in its log, with the width that
+the share of the sizes says (`NoiseModel.shares`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.noise_term import FOLLOWS, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes
+
+_OF_UNIT = 0.5
+"""Probability (1) that noise of a kind is of the unit: sensors are the same in all recordings, benches are not."""
+_ALIKE = 0.2
+"""Standard deviation of the log of a size (1) among recordings where it is of the unit: temperature and age change
+noise by a fifth."""
+Kind = tuple[str, str, tuple[int, ...]]
+"""Triad, kind and sensors of a term; its time constant is known to a factor of two at best."""
+
+
+def kind_of(term: NoiseTerm) -> Kind:
+    """Say what recordings must have alike for noise to be that of the unit."""
+    return term.triad, term.kind, term.axes
+
+
+def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes, odds: Mapping[str, float]) -> float:
+    """Log prior (1) of the noises of all recordings, over white noise in all.
+
+    Parameters
+    ----------
+    own : sequence of NoiseModel
+        Of each recording.
+    odds : mapping of str to float
+        Log odds of each kind beside none (1), as of `log_odds`.
+    """
+    terms: dict[Kind, list[tuple[NoiseTerm, float]]] = {}
+    total = 0.0
+    for noise in own:
+        for term, share in zip(noise.terms, noise.shares, strict=True):
+            if term.kind in FOLLOWS or len(own) < 2:  # a function of the attitude is weighed by what comes back
+                total += share
+            else:
+                terms.setdefault(kind_of(term), []).append((term, share))
+    for (_, kind, _), found in terms.items():
+        apart = np.log(1.0 - _OF_UNIT) + sum(share for _, share in found)
+        alike = -np.inf if len(found) < len(own) else np.log(_OF_UNIT) + _of_unit(found, usual, odds[kind])
+        total += float(np.logaddexp(apart, alike))
+    return total
+
+
+def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float) -> float:
+    """Log prior (1) of a kind of noise that is of the unit, by the term and its share in each recording."""
+    first = found[0][0]
+    centre, spread = np.log(usual.centre[first.triad, first.kind]), usual.spread[first.triad, first.kind]
+    size: Floats = np.array([term.size for term, _ in found])
+    share = np.array([share for _, share in found])
+    at = np.log(size) - centre
+    # Width of the likelihood of each size, and with what the size may differ by.
+    width2 = np.exp(2.0 * (share - odds - usual.log_density(first, size))) / (2.0 * np.pi)
+    wider2 = width2 + _ALIKE**2
+    known = 1.0 / spread**2 + float(np.sum(1.0 / wider2))
+    pull = float(np.sum(at / wider2))
+    squares = float(np.sum(at**2 / wider2))
+    return float(
+        odds
+        + 0.5 * (pull**2 / known - squares)
+        - 0.5 * np.log(spread**2 * known)
+        + 0.5 * np.sum(np.log(width2 / wider2))
+    )

@@ -1,0 +1,68 @@
+"""Prior of noise that all recordings of a set may have alike, against integration by quadrature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from sdimu_calibration.core.joint.unit_noise import log_prior_of_set
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, usual_sizes
+from sdimu_calibration.storage.files.config import load_imu
+
+USUAL = usual_sizes(load_imu("mems_industrial"))
+ODDS = log_odds(8)
+
+
+def having(size, width, kind="flicker"):
+    """Noise of a recording whose likelihood of the log of the size is normal with a width."""
+    term = NoiseTerm("gyro", kind, size=size)
+    mass = float(USUAL.log_density(term, np.array([size]))[0]) + np.log(width * np.sqrt(2.0 * np.pi))
+    return NoiseModel((term,), (ODDS[kind] + mass,))
+
+
+def of_unit_by_quadrature(sizes, widths, alike=0.2):
+    centre, spread = np.log(USUAL.centre["gyro", "flicker"]), USUAL.spread["gyro", "flicker"]
+    at = np.log(sizes)
+
+    def density(s):
+        u2 = np.square(widths) + alike**2
+        each = widths / np.sqrt(u2) * np.exp(-0.5 * (s - at) ** 2 / u2)
+        return np.exp(-0.5 * ((s - centre) / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi)) * np.prod(each)
+
+    return ODDS["flicker"] + np.log(quad(density, centre - 12.0, centre + 12.0, points=at, limit=400)[0])
+
+
+def test_noise_of_the_unit_has_the_prior_of_one_size():
+    usual = USUAL.centre["gyro", "flicker"]
+    sizes, widths = usual * np.array([1.1, 0.8, 1.3]), np.array([0.3, 0.1, 0.8])
+    own = [having(*one) for one in zip(sizes, widths, strict=True)]
+    apart = np.log(0.5) + sum(noise.log_prior for noise in own)
+    expected = np.logaddexp(apart, np.log(0.5) + of_unit_by_quadrature(sizes, widths))
+    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(expected, abs=1e-6)
+    # One size for three costs less than three sizes.
+    assert expected > apart + 2.0
+
+
+def test_noise_of_very_different_sizes_is_that_of_each_recording():
+    usual = USUAL.centre["gyro", "flicker"]
+    own = [having(usual, 0.05), having(20.0 * usual, 0.05)]
+    apart = np.log(0.5) + sum(noise.log_prior for noise in own)
+    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(apart, abs=1e-6)
+
+
+def test_noise_that_one_recording_lacks_is_not_of_the_unit():
+    usual = USUAL.centre["gyro", "flicker"]
+    own = [having(usual, 0.2), having(usual, 0.2), NoiseModel()]
+    apart = np.log(0.5) + sum(noise.log_prior for noise in own)
+    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(apart, abs=1e-12)
+
+
+def test_white_noise_in_all_recordings_costs_nothing():
+    assert log_prior_of_set([NoiseModel()] * 4, USUAL, ODDS) == 0.0
+
+
+def test_an_unknown_function_of_the_attitude_is_weighed_by_each_recording():
+    one = NoiseModel((NoiseTerm("accel", "attitude", size=1e-3),), (-4.0,))
+    assert log_prior_of_set([one, one], USUAL, ODDS) == pytest.approx(-8.0)
