@@ -15,6 +15,7 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.coloured import KINDS, parse_noise
+from sdimu_study.plans import PLANS
 from sdimu_study.score import among, classes, errors
 from sdimu_study.study import Group, Results, Study, head, rms_cell
 from sdimu_study.worlds import OneTest, diagnosed, drawn_effect, drawn_place, rng_of, simulated_test, with_effects
@@ -24,6 +25,8 @@ _INSTABILITY = {"gyro": to_si(0.01, "deg/h"), "accel": to_si(2.0, "ug")}
 """Bias instability (rad/s, m/s^2) where the IMU file states none: of navigation-grade sensors."""
 _TAUS_S = (100.0, 1000.0)
 """Range of the time constant of Markov noise (s)."""
+_RATES_HZ = (20.0, 50.0)
+"""Sample rates that are drawn (Hz)."""
 _WALK_S = 1000.0
 """Averaging time (s) at which the Allan deviation of a random walk is the bias instability."""
 
@@ -43,19 +46,19 @@ class NoiseCase:
 def world(case: NoiseCase, seed: int) -> OneTest:
     """Simulate a test in noise of data-sheet size."""
     rng, imu = rng_of(seed, case.imu, case.kind), load_imu(case.imu)
-    plan, site = drawn_place(rng)
+    (plan, site), rate_hz = drawn_place(rng, PLANS), float(rng.choice(_RATES_HZ))
     noise = () if case.kind == WHITE else drawn_noise(imu, case.kind, rng)
     true = noise_terms(noise)
     span = (case.sigmas, case.sigmas)
 
     def simulated(effects: tuple[str, ...], noise: tuple[str, ...] = noise) -> Any:
-        return simulated_test(case.imu, imu, plan, site, seed, effects, noise)
+        return simulated_test(case.imu, imu, plan, site, seed, effects, noise, rate_hz)
 
     return with_effects(
         simulated,
         load_model("baseline"),
         [lambda fit: drawn_effect(rng, fit, span, noise=true)] if case.sigmas else [],
-        {"plan": plan, "noise": list(noise)},
+        {"plan": plan, "rate_hz": rate_hz, "noise": list(noise)},
         clean=lambda: simulated((), ()),
     )
 
