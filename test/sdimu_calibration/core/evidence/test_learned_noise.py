@@ -10,9 +10,10 @@ import pytest
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence import learned_noise
 from sdimu_calibration.core.evidence.conditions import Conditions
-from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, Wander, learn, likelihood
+from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, RATE, TEMPERATURE, TRIADS, NoiseTerm
 
 STOPS = 12

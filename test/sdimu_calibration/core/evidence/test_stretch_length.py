@@ -9,9 +9,9 @@ import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.noise_kernels import stretches
 from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_in
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model

@@ -10,8 +10,8 @@ import pytest
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.stretch_length import wander_in
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.rival_noises import rival_noises
 from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
 from sdimu_calibration.core.joint.set_evidence import set_evidence

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.planning.predict import predict
 from sdimu_calibration.core.planning.stated_noise import stated_noise
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan

@@ -16,7 +16,7 @@ from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.near import near
 from sdimu_calibration.core.posterior.search import WINDOW

@@ -9,7 +9,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.posterior.posterior import posterior
 
 

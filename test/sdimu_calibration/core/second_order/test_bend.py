@@ -8,7 +8,7 @@ import pytest
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.learned_noise import Wander
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DivergedError
 from sdimu_calibration.core.second_order.bend import bend

@@ -14,8 +14,8 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.solve import extend
 from sdimu_calibration.core.evidence.candidate import Candidate, split
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.posterior.near import near
 from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.progress import Progress

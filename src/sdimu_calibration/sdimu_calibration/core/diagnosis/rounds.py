@@ -24,9 +24,9 @@ from sdimu_calibration.core.diagnosis.unknown_attitude import with_attitude_func
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.progress import Progress

@@ -18,8 +18,9 @@ from sdimu_calibration.core.diagnosis.scan import Scan
 from sdimu_calibration.core.diagnosis.step import Step, step_of
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander, with_alike, with_intervals
+from sdimu_calibration.core.evidence.learned_noise import with_alike, with_intervals
 from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import FOLLOWS, KINDS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior

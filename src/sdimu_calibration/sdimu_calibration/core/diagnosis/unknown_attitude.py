@@ -14,8 +14,9 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import InModes, Wander
+from sdimu_calibration.core.evidence.learned_noise import InModes
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import SENSORS
 

@@ -22,9 +22,9 @@ from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
 from sdimu_calibration.core.estimation.stretch_doubt import doubt_in_stretch
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
 from sdimu_calibration.core.filter.passes import Pass, one_pass, pass_input, pass_settings

@@ -18,8 +18,9 @@ from sdimu_calibration.core.evidence.consistency import stop_means
 from sdimu_calibration.core.evidence.held_out import predict
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Modes, Wander, learn, likelihood, with_alike
+from sdimu_calibration.core.evidence.learned_noise import learn, likelihood, with_alike
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.wander import Modes, Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.probability import chi2_tail
 

@@ -15,10 +15,10 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.evidence.information import solved
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 Span = tuple[float, float]

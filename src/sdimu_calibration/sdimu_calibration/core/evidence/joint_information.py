@@ -10,10 +10,11 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import Information, solved
-from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded, spread
 from sdimu_calibration.core.evidence.taken import taken
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 

@@ -16,9 +16,10 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.inner_noise import inner_noise
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander, learn
+from sdimu_calibration.core.evidence.learned_noise import learn
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 
 MOVES = 0.5

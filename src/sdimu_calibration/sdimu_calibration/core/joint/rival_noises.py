@@ -14,10 +14,10 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded
 from sdimu_calibration.core.evidence.taken import taken
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.noise_models import NoiseModel

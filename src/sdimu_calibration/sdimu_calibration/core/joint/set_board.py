@@ -12,8 +12,9 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import TIMES, Wander
+from sdimu_calibration.core.evidence.learned_noise import TIMES
 from sdimu_calibration.core.evidence.taken import nothing_taken
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on

@@ -18,11 +18,11 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.attitude_functions import way
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, reduced, unit_noise
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import TemperatureLog

@@ -15,11 +15,12 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import of_the_sensor
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, Wander, likelihood
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, likelihood
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.noise_root import folded, root_of, spread
 from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken, taken
 from sdimu_calibration.core.evidence.testable import TESTABLE
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains
 from sdimu_calibration.core.posterior.noise_models import NoiseModel, explored, usual_sizes

@@ -12,9 +12,9 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import Wander
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
+from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
