@@ -9,7 +9,7 @@ from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
-from sdimu_calibration.core.diagnosis.verdict import beyond, error_falls
+from sdimu_calibration.core.diagnosis.verdict import POSSIBLE, beyond, error_falls
 from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import without_advice
@@ -41,8 +41,6 @@ _EACH = 4
 """Number of families of which the smallest size is told, of gyros and of accelerometers each."""
 _ASSUMED = 4
 """Number of effects taken for granted that are named: the page has them for every coefficient."""
-POSSIBLE = 0.1
-"""Probability (1) from which something that is not told is listed as possible: less is one of many."""
 
 
 def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, more: ReportExtras | None = None) -> None:

@@ -23,7 +23,7 @@ from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
-from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities, Share
+from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import cost, first_screen
 
@@ -162,6 +162,27 @@ def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):
     assert turns.about == ("accel_cubic_z", "accel_quadratic_z")
     assert Kind.RECORD_MORE in {one.kind for one in advice(d, (), (), plan_seen(d.navigation))}
     assert Kind.RECORD_MORE in {one.kind for one in handheld_advice(d, ())}
+
+
+def test_what_is_unexplained_beside_noise_that_every_sensor_has_says_what_may_be_missing(summary):
+    family = FamilyShare(
+        "accel_cubic", "accel_z", 0.43, (MemberShare("accel_cubic_z", 0.43, 1.0, 0.1, "1/g", "ppm/g"),)
+    )
+    follows = NoiseShare("accel", ATTITUDE, 0.57, 1.0, 0.5, 2.0, "m/s^2", (0, 2))
+    plain = NoiseShare("accel", FLICKER, 1.0, 1.0, 0.5, 2.0, "m/s^2")
+    found = replace(
+        summary.diagnosis.found,
+        chosen=np.empty(0, dtype=np.int64),
+        noise=(NoiseTerm("accel", FLICKER, size=1e-3, low=5e-4, high=2e-3),),
+    )
+    d = replace(summary.diagnosis, verdict=Verdict.UNEXPLAINED, found=found)
+    vars(d)["probabilities"] = Probabilities(0.0, (family,), (plain, follows))
+    assert sentence(d, ()) == (
+        "Something is missing, and which is open: an accel x and z error that follows the attitude 57 %, "
+        "accel_cubic_z 43 %; the sigmas take each into account."
+    )
+    vars(d)["probabilities"] = Probabilities(0.9, (), (plain,))
+    assert sentence(d, ()).startswith("Something is missing that looks like accel bias instability")
 
 
 def test_members_of_one_recording_and_very_many_of_them_are_said_in_words():

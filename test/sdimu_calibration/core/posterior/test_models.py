@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from bare_prior import prior
 from scipy.stats import multivariate_normal
 
 from sdimu_calibration.core.posterior.models import Data
@@ -13,22 +14,6 @@ from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, MOST_DRIFTS
 from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
 
 ROWS = 40
-
-
-def prior(q: int, **changes) -> Prior:
-    """Candidates that have nothing to do with each other, the first two but for their cause."""
-    usual = np.log(np.linspace(1.0, 2.0, q) / np.linspace(1.0, 2.0, q).sum())
-    kept = {
-        "log_share": usual,
-        "cause": np.array([0, 0, *range(1, q - 1)]),
-        "parameter": np.arange(q),
-        "repeats": np.zeros(q, dtype=bool),
-        "positive": np.zeros(q, dtype=bool),
-        "own": np.zeros(q, dtype=bool),
-        "drift": np.full(q, -1),
-        "twin": np.arange(q),
-    }
-    return Prior(**(kept | changes))
 
 
 def drawn(q: int, rng: np.random.Generator, alike: float = 0.9) -> np.ndarray:

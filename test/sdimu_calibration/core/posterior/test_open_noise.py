@@ -9,7 +9,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
-from sdimu_calibration.core.evidence.learned_noise import root_of
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import RANDOM_WALK, TRIADS, NoiseTerm
 
 

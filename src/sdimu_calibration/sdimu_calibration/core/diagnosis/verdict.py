@@ -15,7 +15,8 @@ from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
-from sdimu_calibration.core.noise_term import FOLLOWS
+from sdimu_calibration.core.noise_term import FOLLOWS, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.probability import in_percent
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
     from sdimu_calibration.core.diagnosis.found import Found
 
+POSSIBLE = 0.1
+"""Probability (1) from which something that is not told is listed as possible: less is one of many."""
 _COLOURED = 1.2
 """Ratio of the scatter over ten seconds to that of white noise from which noise is coloured: five sigma of fifty
 minutes."""
@@ -169,6 +172,9 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         # Noise that every sensor has is no part of what is unexplained.
         account = " and ".join(("it", *drawn))
         return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
+    may_be = "" if names or not NoiseModel(d.found.noise).wanders_alone else _may_be(d.probabilities)
+    if may_be:
+        return f"Something is missing, and which is open: {may_be}; the sigmas take each into account."
     if drawn:
         begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
         return (
@@ -181,6 +187,17 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         noise = " in the noise that was learned" if noise_learned(d.after) else ""
         tail += f", and the error at stops held out is then {error:.2f}{noise} (1 is right)"
     return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
+
+
+def _may_be(told: Probabilities | None) -> str:
+    """List effects, and noise that stands for one, that may be missing, the likeliest first; empty where none may."""
+    if told is None:
+        return ""
+    shares = [(one.probability, _in_words(one.label)) for f in told.families for one in f.members]
+    terms = [(one.probability, NoiseTerm(one.triad, one.kind, axes=one.axes)) for one in told.noise]
+    shares += [(p, f"an {term.words}") for p, term in terms if term.kind in FOLLOWS]
+    likely = sorted((one for one in shares if one[0] >= POSSIBLE), key=lambda one: -one[0])[:LISTED]
+    return ", ".join(f"{words} {in_percent(p)}" for p, words in likely)
 
 
 def error_falls(d: Diagnosis) -> str:

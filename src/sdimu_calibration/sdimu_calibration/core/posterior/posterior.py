@@ -293,7 +293,8 @@ def posterior(
     wide = before is None or (_has_functions(wander) and not _has_functions(before.board.wander))
     tried = before.tried if before is not None and not wide else None
     settled = not wide and len(starts) > 0
-    noises, members, beside = _climbed(board, starts or [()], tried, settled)
+    noises, ends, beside = climbed(board, starts or [()], tried, settled)
+    members = ends[0]
     asked: set[str] = set()
     made = 0
     while made < _MOST_SHARPENED:
@@ -304,10 +305,11 @@ def posterior(
         noises, members = _in_same_noise(board, starts, noises)
         made += 1
     if made:
-        noises, members, beside = _climbed(board, [members], tried, settled=True)
+        noises, ends, beside = climbed(board, [members], tried, settled=True)
+        members = ends[0]
     board = board.in_excess(board.excess_of(members, noises[0]))
     data = [board.data(noise) for noise in noises]
-    starts = [members, *crossed(data[0][1], members)]
+    starts = [*ends, *crossed(data[0][1], members)]
     found = window([d for _, d in data], [offset for offset, _ in data], starts)
     models = _weighed(found, noises)
     beside = [((score - noise.log_prior) / board.excess + noise.log_prior, noise) for score, noise in beside]
@@ -316,7 +318,7 @@ def posterior(
 
 def noises_of(board: Board[E]) -> list[NoiseModel]:
     """Find the noises that are probable beside the best effects, the likeliest first, then those beside none."""
-    noises, _, beside = _climbed(board, [()])
+    noises, _, beside = climbed(board, [()])
     return [*noises, *(noise for _, noise in beside), *(noise for _, noise in board.noises(()))]
 
 
@@ -356,9 +358,9 @@ def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseMode
     return tuple(Weighed(m, noises[k], p) for ((k, m), _), p in zip(ranked, share, strict=True))
 
 
-def _climbed(
+def climbed(
     board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, settled: bool = False
-) -> tuple[list[NoiseModel], Members, list[tuple[float, NoiseModel]]]:
+) -> tuple[list[NoiseModel], list[Members], list[tuple[float, NoiseModel]]]:
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
     Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
@@ -369,10 +371,10 @@ def _climbed(
     -------
     noises : list of NoiseModel
         That of the best model first.
-    members : tuple of (int, int)
-        The best model.
+    ends : list of tuple of (int, int)
+        The best model, then the best one in each of the noises.
     beside : list of (float, NoiseModel)
-        Noises beside its effects, with the log posterior of both (1).
+        Noises beside the effects of the best model, with the log posterior of both (1).
     """
     asked: dict[Members, list[tuple[float, NoiseModel]]] = {}
     known: list[tuple[float, NoiseModel, Members]] = []
@@ -385,15 +387,18 @@ def _climbed(
         best, members = max(
             (best_from(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0]
         )
+    rivals: list[Members] = []
     for _ in range(_ROUNDS):
-        if members in asked:
-            break
         beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
+        wanted = [one for one in dict.fromkeys([*beside, *rivals]) if one not in asked]
+        if members in asked and not rivals:
+            break
         # Few effects first: beside many that white noise asked for, noise that is far behind is given up at once.
-        for one in sorted(dict.fromkeys(beside), key=len):
-            if one in asked:
-                continue
-            asked[one] = _noises_beside(board, one, tried, best, [noise for _, noise, _ in known])
+        for one in sorted(wanted, key=len):
+            kinds = _kinds(known)
+            asked[one] = (
+                board.noises(one, kinds, best) if one in rivals else _noises_beside(board, one, tried, best, kinds)
+            )
             for score, noise in asked[one]:
                 _add(known, score, noise, one)
                 best = max(best, score)
@@ -418,18 +423,26 @@ def _climbed(
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)
+        # A size that was found beside other effects took up what these explain: beside them the noise may be likelier.
+        others = (one for score, _, one in known if score > known[0][0] - WINDOW)
+        rivals = [one for one in dict.fromkeys(others) if one not in asked and one != members][:1]
     if members not in asked:
         asked[members] = board.noises(members, tried, best)
-    return [noise for score, noise, _ in known if score > known[0][0] - WINDOW], members, asked[members]
+    kept = [(noise, one) for score, noise, one in known if score > known[0][0] - WINDOW]
+    return [noise for noise, _ in kept], list(dict.fromkeys([members, *(one for _, one in kept)])), asked[members]
+
+
+def _kinds(known: Sequence[tuple[float, NoiseModel, Members]]) -> list[NoiseTerm]:
+    """Kinds of noise that are known beside some effects, each once."""
+    return list({t.identity: t for _, noise, _ in known for t in noise.terms}.values())
 
 
 def _noises_beside(
-    board: Board[E], members: Members, tried: Sequence[NoiseTerm] | None, best: float, known: Sequence[NoiseModel]
+    board: Board[E], members: Members, tried: Sequence[NoiseTerm] | None, best: float, known: Sequence[NoiseTerm]
 ) -> list[tuple[float, NoiseModel]]:
     """Noises beside effects; of kinds that are `known` beside others alone where these leave them far behind."""
     if tried is None and known:
-        kinds = list({t.identity: t for noise in known for t in noise.terms}.values())
-        found = board.noises(members, kinds, best)
+        found = board.noises(members, known, best)
         if max((score for score, _ in found), default=-np.inf) < best - _FAR:
             return found
     return board.noises(members, tried, best)
