@@ -178,9 +178,12 @@ def test_what_is_unexplained_beside_noise_that_every_sensor_has_says_what_may_be
     d = replace(summary.diagnosis, verdict=Verdict.UNEXPLAINED, found=found)
     vars(d)["probabilities"] = Probabilities(0.0, (family,), (plain, follows))
     assert sentence(d, ()) == (
-        "Something is missing, and which is open: an accel x and z error that follows the attitude 57 %, "
-        "accel_cubic_z 43 %; the sigmas take each into account."
+        "Something is missing, and which is open: accel x and z error that follows the attitude 57 %, "
+        "accel_cubic_z 43 %."
     )
+    # What is less likely missing than not is not listed, whatever alarm rings.
+    vars(d)["probabilities"] = Probabilities(0.88, (replace(family, probability=0.11),), (plain,))
+    assert "which is open" not in sentence(d, ())
     vars(d)["probabilities"] = Probabilities(0.9, (), (plain,))
     assert sentence(d, ()).startswith("Something is missing that looks like accel bias instability")
 

@@ -9,69 +9,99 @@ import pytest
 from bare_prior import prior
 
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.climb import climbed
 from sdimu_calibration.core.posterior.models import Data
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.posterior.posterior import climbed
 from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
 
-WANDER = NoiseTerm("accel", "flicker", size=1.0)
-FOLLOWS = NoiseTerm("accel", "rate", size=5.0)
-SMALLER = NoiseTerm("accel", "flicker", size=0.5)
-WHITE, WIDE = NoiseModel(), NoiseModel((WANDER,), (-1.0,))
-LIKE_AN_EFFECT = NoiseModel((WANDER, FOLLOWS), (-1.0, -4.0))
-NARROW = NoiseModel((SMALLER,), (-1.0,))
+WHITE = NoiseModel()
+WIDE = NoiseModel((NoiseTerm("accel", "flicker", size=1.0),), (-1.0,))
+NARROW = NoiseModel((NoiseTerm("accel", "flicker", size=0.5),), (-1.0,))
+LIKE_AN_EFFECT = NoiseModel((WIDE.terms[0], NoiseTerm("accel", "rate", size=5.0)), (-1.0, -4.0))
+WALK = NoiseModel((NoiseTerm("gyro", "random_walk", size=1.0),), (-1.0,))
 
 
 class Board:
-    """One effect; beside it the wandering noise is half as large as beside none, and noise that follows is needless."""
+    """One effect. Beside it noise wanders half as much, and needs no term that follows the rate.
+
+    `levels` of each noise: log posterior of no effect in it, and how strongly the effect shows.
+    """
 
     has_noises = True
-    known = prior(3)
     evidence = SimpleNamespace(
         weight=np.zeros(0),
         candidates=[SimpleNamespace(effect=SimpleNamespace(bias_drift=False, wander_like=False, scope="unit"))] * 3,
     )
 
-    def __init__(self):
-        # Log posterior of no effect, and what the effect gains in its square.
-        self.levels = {WHITE: (0.0, 8.0), WIDE: (900.0, 8.0), LIKE_AN_EFFECT: (932.0, 1.0), NARROW: (890.0, 10.0)}
+    def __init__(self, walk=False):
+        self.levels = {WHITE: (0.0, 0.0), WIDE: (900.0, 4.0), LIKE_AN_EFFECT: (932.0, 0.0), NARROW: (890.0, 10.0)}
+        self.levels[WALK] = (905.0, 10.0)
+        self.beside_none = [(932.0, LIKE_AN_EFFECT), (900.0, WIDE)]
+        self.walk, self.asked = walk, []
 
     def data(self, noise):
         offset, pull = self.levels[noise]
-        J = np.diag([1.0, 0.0, 0.0])
-        return offset, Data(J, np.array([pull * 1.5, 0.0, 0.0]), self.known)
+        return offset, Data(np.diag([1.0, 0.0, 0.0]), np.array([pull * 1.5, 0.0, 0.0]), prior(3))
 
     def columns(self, members):
         return [k for k, _ in members]
 
-    def noises(self, members, _tried=None, _rival=0.0):
+    def gain(self, noise):
+        """Log posterior of the effect over that of none."""
+        return best_from(self.data(noise)[1], ())[0]
+
+    def noises(self, members, tried=None, _rival=0.0):
+        self.asked.append(members)
         if not members:
-            return [(932.0, LIKE_AN_EFFECT), (900.0, WIDE)]
-        return [(890.0 + best_from(self.data(NARROW)[1], ())[0], NARROW)]
+            return self.beside_none
+        found = [(self.levels[NARROW][0] + self.gain(NARROW), NARROW)]
+        if self.walk and (tried is None or any(t.kind == "random_walk" for t in tried)):
+            found.insert(0, (self.levels[WALK][0] + self.gain(WALK), WALK))
+        return found
 
 
-def test_an_effect_stands_beside_the_noise_that_it_leaves():
+def test_an_effect_is_looked_for_without_the_noise_that_stands_for_it():
+    """In white noise it does not show, and wide noise alone is too far behind for effects to be looked for in it."""
     board = Board()
+    board.levels[WIDE] = (900.0, 10.0)
+    # Effects are looked for in noises within 15 of the best one, and in this.
+    assert board.levels[LIKE_AN_EFFECT][0] - board.levels[WIDE][0] > 15.0
     noises, ends, _ = climbed(board, [()])
+    assert noises[0] in {WIDE, NARROW}
+    assert [k for k, _ in ends[0]] == [0]
+
+
+def test_an_effect_a_little_behind_noise_that_stands_for_it_is_weighed_in_noise_of_its_own():
+    board = Board()
+    board.levels[WIDE] = (900.0, 5.5)
+    assert 0.0 < board.levels[LIKE_AN_EFFECT][0] - board.levels[WIDE][0] - board.gain(WIDE) < WINDOW
+    noises, ends, _ = climbed(board, [()])
+    assert any(members for members in board.asked)
     assert noises[0] == NARROW
     assert [k for k, _ in ends[0]] == [0]
 
 
+def test_beside_what_turns_out_best_every_kind_of_noise_was_looked_for():
+    """Asked as a rival it was asked of the kinds alone that were known then."""
+    board = Board(walk=True)
+    board.levels[WIDE] = (900.0, 5.5)
+    noises, ends, beside = climbed(board, [()])
+    assert noises[0] == WALK
+    assert [k for k, _ in ends[0]] == [0]
+    assert WALK in [noise for _, noise in beside]
+
+
 def test_an_effect_that_is_as_likely_as_noise_is_in_the_window_with_its_noise():
     board = Board()
-    gain, _ = best_from(board.data(NARROW)[1], ())
-    # The two answers are a third apart in the log posterior, the noise first.
-    board.levels[LIKE_AN_EFFECT] = (890.0 + gain + 0.3, 0.0)
-    board.noises = lambda members, _tried=None, _rival=0.0: (
-        [(890.0 + gain, NARROW)] if members else [(890.0 + gain + 0.3, LIKE_AN_EFFECT), (900.0, WIDE)]
-    )
+    as_likely = board.levels[NARROW][0] + board.gain(NARROW) + 0.3
+    board.levels[LIKE_AN_EFFECT] = (as_likely, 0.0)
+    board.levels[WIDE] = (887.0, board.levels[NARROW][1])
+    board.beside_none = [(as_likely, LIKE_AN_EFFECT), (887.0, WIDE)]
     noises, ends, _ = climbed(board, [()])
     assert noises[0] == LIKE_AN_EFFECT
-    assert NARROW in noises
     data = [board.data(noise) for noise in noises]
-    # No move leads from nothing in the one noise to the effect in the other: it must be a start.
-    nothing_in_narrow = board.data(NARROW)[0]
-    assert nothing_in_narrow < 890.0 + gain - WINDOW
     found = window([d for _, d in data], [offset for offset, _ in data], ends)
-    of_effect = max(score for (number, members), score in found.items() if noises[number] == NARROW and members)
-    assert of_effect == pytest.approx(max(found.values()) - 0.3, abs=0.2)
+    # No move leads from nothing in the one noise to the effect in the other: it must be a start.
+    of_effect = [score for (number, members), score in found.items() if noises[number] != LIKE_AN_EFFECT and members]
+    assert max(of_effect) == pytest.approx(max(found.values()), abs=WINDOW)
+    assert not any(noises[number] == WIDE and not members for number, members in found)

@@ -118,3 +118,25 @@ def test_noise_of_one_triad_is_found_beside_strong_noise_of_the_other(cut, usual
     found = told(information, cut, usual)
     assert found["gyro", FLICKER] > 0.9
     assert found["accel", SHIFT] > 0.5
+
+
+def test_the_likeliest_noise_without_terms_like_effects_is_found_where_all_others_have_some(cut, usual):
+    """Errors of stops and turns in both triads, over flicker: flicker in both triads at once was never tried."""
+    rng, n = np.random.default_rng(0), len(cut)
+    J, error = np.zeros((n, 6)), np.zeros((n, 6))
+    for place, triad in enumerate(TRIADS):
+        axes, size = slice(3 * place, 3 * place + 3), usual.centre[triad, FLICKER]
+        J[:, axes] = (SHARE[FLICKER] / size) ** 2
+        for kind, share in ((FLICKER, 0.7), (STOP, 4.0), (TURN, 30.0)):
+            root = np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(n))
+            error[:, axes] += share * size * root @ rng.standard_normal((n, 3))
+    J = J.ravel()
+    information = NoiseInformation(np.diag(J), J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n), 0.0)
+    found = explored(information, cut, usual, TRIED)
+    assert not found[0][1].wanders_alone
+    score, noise = found[-1]
+    assert noise.wanders_alone
+    assert {term.triad for term in noise.terms} == set(TRIADS)
+    # No other such noise is a better place to look for effects.
+    alone = [t for t in TRIED if t.kind in {RANDOM_WALK, FLICKER}]
+    assert score == pytest.approx(explored(information, cut, usual, alone)[0][0])

@@ -80,6 +80,7 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     """Search, and again in noise that moves within stretches where the noise that was found does.
 
     Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
+    The first round finds both; where its noise does not move, that of the last one is asked again.
 
     Returns
     -------

@@ -16,7 +16,7 @@ from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
 from sdimu_calibration.core.noise_term import FOLLOWS, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.probability import in_percent
@@ -174,7 +174,7 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
     may_be = "" if names or not NoiseModel(d.found.noise).wanders_alone else _may_be(d.probabilities)
     if may_be:
-        return f"Something is missing, and which is open: {may_be}; the sigmas take each into account."
+        return f"Something is missing, and which is open: {may_be}."
     if drawn:
         begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
         return (
@@ -190,12 +190,17 @@ def _unexplained(d: Diagnosis, names: str) -> str:
 
 
 def _may_be(told: Probabilities | None) -> str:
-    """List effects, and noise that stands for one, that may be missing, the likeliest first; empty where none may."""
+    """List effects, and noise that stands for one, that may be missing, the likeliest first.
+
+    Empty where it is more likely that none of them is.
+    """
     if told is None:
         return ""
     shares = [(one.probability, _in_words(one.label)) for f in told.families for one in f.members]
-    terms = [(one.probability, NoiseTerm(one.triad, one.kind, axes=one.axes)) for one in told.noise]
-    shares += [(p, f"an {term.words}") for p, term in terms if term.kind in FOLLOWS]
+    like = [one for one in told.noise if one.kind in LIKE_EFFECTS]
+    if 1.0 - told.nothing + sum(one.probability for one in like) < PROBABLE:
+        return ""
+    shares += [(one.probability, NoiseTerm(one.triad, one.kind, axes=one.axes).words) for one in like]
     likely = sorted((one for one in shares if one[0] >= POSSIBLE), key=lambda one: -one[0])[:LISTED]
     return ", ".join(f"{words} {in_percent(p)}" for p, words in likely)
 

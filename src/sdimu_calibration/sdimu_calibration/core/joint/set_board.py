@@ -22,7 +22,7 @@ from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
 from sdimu_calibration.core.posterior.models import Members, gains
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel, log_odds, usual_sizes
 from sdimu_calibration.core.posterior.prior import Prior, prior_of, twins
 
 _NEAR = 6.0
@@ -108,6 +108,7 @@ class SetBoard(Board[SetEvidence]):
         self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self._white = (0,) * len(self.rivals)
+        self._found: dict[Members, dict[tuple[int, ...], float]] = {}
         self._usual = usual_sizes(evidence.imu), log_odds(TIMES)
         self._told = len(evidence.weight) + np.arange(len(told))
         self.known = self._names[: len(evidence.weight) + len(told)]
@@ -189,15 +190,18 @@ class SetBoard(Board[SetEvidence]):
             return best
 
         best = swept(self._white)
-        # No single recording may ask for noise that all of them have.
-        together = max(self._of_unit(best), key=score, default=best)
-        if score(together) > score(best):
-            swept(together)
-        return found
+        # No single recording may ask for noise that all of them have: one kind after another.
+        while True:
+            together = max(self._of_unit(best), key=score, default=best)
+            if not score(together) > score(best):
+                return found
+            best = swept(together)
 
     def _of_unit(self, best: tuple[int, ...]) -> list[tuple[int, ...]]:
         """Choices in which one kind of noise is in all recordings; each recording else as near `best` as it can."""
-        kinds = [[{kind_of(t) for t in one.noise.terms} for one in own] for own in self.rivals]
+        kinds = [
+            [{kind_of(t) for t in one.noise.terms if t.kind not in LIKE_EFFECTS} for one in own] for own in self.rivals
+        ]
         out = []
         for kind in sorted(set.intersection(*(set().union(*own) for own in kinds))):
             chosen = []
@@ -235,9 +239,13 @@ class SetBoard(Board[SetEvidence]):
         """
         del tried, rival
         alone = self.data(NoiseModel())[1].at(members).of_any_sign
-        found = self._tried(*self.parameters(members))
-        ranked = sorted(found.items(), key=lambda one: -one[1])
-        return [(alone + gain, self._noise(chosen)) for chosen, gain in ranked if gain > ranked[0][1] - _NEAR]
+        if members not in self._found:
+            self._found[members] = self._tried(*self.parameters(members))
+        ranked = sorted(self._found[members].items(), key=lambda one: -one[1])
+        every = [(alone + gain, self._noise(chosen)) for chosen, gain in ranked]
+        near = [one for one in every if one[0] > every[0][0] - _NEAR]
+        wanders = any(noise.wanders_alone for _, noise in near)
+        return near if wanders else [*near, next(one for one in every if one[1].wanders_alone)]
 
     def noise_of(self, fit: SetFit, likeliest: NoiseModel) -> NoiseModel:
         """Find the noise in which a fit stands: of each recording that with the terms it has learned, near in size.

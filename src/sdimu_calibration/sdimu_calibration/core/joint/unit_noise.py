@@ -5,8 +5,8 @@ them together may. So each kind of noise is of the unit or of single recordings,
 
     p = 1/2 prod_r p(K) p(s_r) + 1/2 p(K) int p(s) prod_r N(s_r; s, delta^2) ds
 
-with s_r the log of the size in recording r. The likelihood of a size is taken as normal in its log, with the width that
-the share of the sizes says (`NoiseModel.shares`).
+with s_r the log of the size in recording r. The likelihood of a size is taken as normal in its log: mode and width of
+the posterior, which the share of the sizes says (`NoiseModel.shares`), without the prior that is in both.
 """
 
 from __future__ import annotations
@@ -16,16 +16,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.noise_term import FOLLOWS, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel, Sizes
 
 _OF_UNIT = 0.5
 """Probability (1) that noise of a kind is of the unit: sensors are the same in all recordings, benches are not."""
 _ALIKE = 0.2
 """Standard deviation of the log of a size (1) among recordings where it is of the unit: temperature and age change
 noise by a fifth."""
+_ONE_TIME = 4.0
+"""Ratio of the time constants of recordings up to which they may be one: two steps of those that are tried."""
+_UNKNOWN = 1e-3
+"""Information on a size over that of its prior (1) that stands for none: a wider posterior is rounding."""
 Kind = tuple[str, str, tuple[int, ...]]
-"""Triad, kind and sensors of a term; its time constant is known to a factor of two at best."""
+"""Triad, kind and sensors of a term."""
 
 
 def kind_of(term: NoiseTerm) -> Kind:
@@ -47,15 +51,22 @@ def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes, odds: Mapping[str,
     total = 0.0
     for noise in own:
         for term, share in zip(noise.terms, noise.shares, strict=True):
-            if term.kind in FOLLOWS or len(own) < 2:  # a function of the attitude is weighed by what comes back
+            # What hangs on attitude or turns is of the sensors no more than of the bench.
+            if term.kind in LIKE_EFFECTS or len(own) < 2:
                 total += share
             else:
                 terms.setdefault(kind_of(term), []).append((term, share))
     for (_, kind, _), found in terms.items():
         apart = np.log(1.0 - _OF_UNIT) + sum(share for _, share in found)
-        alike = -np.inf if len(found) < len(own) else np.log(_OF_UNIT) + _of_unit(found, usual, odds[kind])
+        everywhere = len(found) == len(own) and _one_time([term.tau for term, _ in found])
+        alike = np.log(_OF_UNIT) + _of_unit(found, usual, odds[kind]) if everywhere else -np.inf
         total += float(np.logaddexp(apart, alike))
     return total
+
+
+def _one_time(tau: Sequence[float]) -> bool:
+    """Whether the time constants (s) of recordings may be one; those of noise without one are zero."""
+    return max(tau) <= _ONE_TIME * min(tau)
 
 
 def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float) -> float:
@@ -64,9 +75,11 @@ def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float
     centre, spread = np.log(usual.centre[first.triad, first.kind]), usual.spread[first.triad, first.kind]
     size: Floats = np.array([term.size for term, _ in found])
     share = np.array([share for _, share in found])
-    at = np.log(size) - centre
-    # Width of the likelihood of each size, and with what the size may differ by.
-    width2 = np.exp(2.0 * (share - odds - usual.log_density(first, size))) / (2.0 * np.pi)
+    mode = np.log(size) - centre
+    of_posterior = np.exp(2.0 * (share - odds - usual.log_density(first, size))) / (2.0 * np.pi)
+    # Of the likelihood: a posterior as wide as the prior says that the data know nothing.
+    width2 = 1.0 / np.maximum(1.0 / of_posterior - 1.0 / spread**2, _UNKNOWN / spread**2)
+    at = mode * (1.0 + width2 / spread**2)
     wider2 = width2 + _ALIKE**2
     known = 1.0 / spread**2 + float(np.sum(1.0 / wider2))
     pull = float(np.sum(at / wider2))
@@ -75,5 +88,6 @@ def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float
         odds
         + 0.5 * (pull**2 / known - squares)
         - 0.5 * np.log(spread**2 * known)
-        + 0.5 * np.sum(np.log(width2 / wider2))
+        # The share is that of the size at the mode of the posterior, not of the likelihood.
+        + 0.5 * np.sum(np.log(width2 / wider2) + (at - mode) ** 2 / width2)
     )

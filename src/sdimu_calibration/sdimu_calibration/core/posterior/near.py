@@ -20,9 +20,10 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E, candidate_priors
 from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.climb import without_drifts
 from sdimu_calibration.core.posterior.models import Data, Expansion, Members, gains
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.posterior.posterior import Posterior, without_drifts
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE, Prior, prior_of
 from sdimu_calibration.core.posterior.search import WINDOW
 

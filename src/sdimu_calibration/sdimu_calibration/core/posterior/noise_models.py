@@ -81,7 +81,7 @@ _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
-_LIKE_EFFECTS = frozenset((*FOLLOWS, STOP, TURN, SHIFT))
+LIKE_EFFECTS = frozenset((*FOLLOWS, STOP, TURN, SHIFT))
 """Kinds of noise that hang on attitude, rate, turns or temperature: an effect that is not in the model looks like
 them."""
 _MOST_TERMS = 2
@@ -122,7 +122,7 @@ class NoiseModel:
     @property
     def wanders_alone(self) -> bool:
         """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
-        return not any(t.kind in _LIKE_EFFECTS for t in self.terms)
+        return not any(t.kind in LIKE_EFFECTS for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -381,7 +381,8 @@ def explored(
         best = search.settled(search.best().noise.terms)
     search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
-    near = [found for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
-    if not any(found.noise.wanders_alone for found in near):
-        near.append(next(found for found in ranked if found.noise.wanders_alone))
-    return [(found.score, found.noise) for found in near]
+    near = [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
+    if any(noise.wanders_alone for _, noise in near):
+        return near
+    wandering = [term for term in search.tried if term.kind not in LIKE_EFFECTS]
+    return [*near, *explored(information, cut, usual, wandering)[:1]]

@@ -16,38 +16,25 @@ from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
-from sdimu_calibration.core.posterior.board import Board, same_noise
+from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.climb import climbed, in_same_noise
 from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
+from sdimu_calibration.core.posterior.search import WINDOW, window
 from sdimu_calibration.core.posterior.sharpening import hoped, sharpened
 
 PROBABLE = 0.5
 """Probability from which a class of effects is told as found: more likely there than not."""
-_ROUNDS = 4
-"""Number of times that noises and effects are looked for in turn: each beside the best of the other."""
 _OPEN = 0.02
 """Probability of a noise (1) from which the effects beside it are begun with when the point has moved: less would not
 change what is told."""
 _SEEN = 0.003
 """Probability of a noise (1) from which its kinds are looked for when the point has moved: those below it together are
 less than is told."""
-_TIE = 0.5
-"""Log posterior (1) by which another model must beat the one that a search begins with: fits about two that look the
-same would go to and fro."""
-_HOPEFUL = 15.0
-"""Log posterior (1) behind the best model up to which effects are looked for in a noise: more do not make up for it."""
-_FAR = 30.0
-"""Log posterior (1) behind the best model from which effects in the noises that are known are looked at no further: a
-kind of noise that is known beside no others adds less."""
 _MOST_SHARPENED = 20
 """Number of times or time constants that are put between those of the scan at most: each takes a climb."""
-_FEW = 2
-"""Number of noises in which effects are looked for again when a time constant was sharpened: the likeliest."""
-_NOISES = 6
-"""Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 
 
 @dataclass(frozen=True)
@@ -302,7 +289,7 @@ def posterior(
         if sharper is None:
             break
         board, starts = sharper
-        noises, members = _in_same_noise(board, starts, noises)
+        noises, members = in_same_noise(board, starts, noises)
         made += 1
     if made:
         noises, ends, beside = climbed(board, [members], tried, settled=True)
@@ -356,125 +343,3 @@ def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseMode
     weight = np.exp(np.array([score for _, score in ranked]) - ranked[0][1])
     share = (weight / weight.sum()).tolist()
     return tuple(Weighed(m, noises[k], p) for ((k, m), _), p in zip(ranked, share, strict=True))
-
-
-def climbed(
-    board: Board[E], starts: Sequence[Members], tried: Sequence[NoiseTerm] | None = None, settled: bool = False
-) -> tuple[list[NoiseModel], list[Members], list[tuple[float, NoiseModel]]]:
-    """Look for noises beside the best effects, and for effects in each noise, until neither changes.
-
-    Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
-    looked for beside the best effects and those of the start alone, and only the kinds that were `tried`; all kinds
-    without any.
-
-    Returns
-    -------
-    noises : list of NoiseModel
-        That of the best model first.
-    ends : list of tuple of (int, int)
-        The best model, then the best one in each of the noises.
-    beside : list of (float, NoiseModel)
-        Noises beside the effects of the best model, with the log posterior of both (1).
-    """
-    asked: dict[Members, list[tuple[float, NoiseModel]]] = {}
-    known: list[tuple[float, NoiseModel, Members]] = []
-    start = starts[0]
-    white = board.data(NoiseModel())[1]
-    if settled and tried:
-        # What white noise asks for beside noise that is probable are no effects.
-        best, members = white.at(start).score, start
-    else:
-        best, members = max(
-            (best_from(white, one, of_two=not board.has_noises) for one in starts), key=lambda found: found[0]
-        )
-    rivals: list[Members] = []
-    for _ in range(_ROUNDS):
-        beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
-        wanted = [one for one in dict.fromkeys([*beside, *rivals]) if one not in asked]
-        if members in asked and not rivals:
-            break
-        # Few effects first: beside many that white noise asked for, noise that is far behind is given up at once.
-        for one in sorted(wanted, key=len):
-            kinds = _kinds(known)
-            asked[one] = (
-                board.noises(one, kinds, best) if one in rivals else _noises_beside(board, one, tried, best, kinds)
-            )
-            for score, noise in asked[one]:
-                _add(known, score, noise, one)
-                best = max(best, score)
-        # Beside effects that are no model in that noise a noise may be better than all models: it counts no further.
-        hopeful = min(best, max(score for score, _, _ in known)) - _HOPEFUL
-        ranked = sorted(known, key=lambda found: -found[0])
-        near = [found for found in ranked if found[0] >= hopeful][:_NOISES]
-        if not any(noise.wanders_alone for _, noise, _ in near):
-            # Noise that hangs on attitude or rate took up what may be an effect, which is seen only without that noise.
-            near += [found for found in ranked if found[1].wanders_alone][:1]
-        known = []
-        for _, noise, one in near:
-            offset, data = board.data(noise)
-            trials = [best_from(data, begin, of_two=False) for begin in dict.fromkeys([members, one, *starts])]
-            gain, found = max(trials, key=lambda t: t[0])
-            if not np.isfinite(gain):  # none of these is a model in that noise
-                gain, found = best_from(data, (), of_two=False)
-            known.append((offset + gain, noise, found))
-        known.sort(key=lambda found: -found[0])
-        offset, data = board.data(known[0][1])
-        score, members = best_from(data, known[0][2])
-        if start and data.at(start).score > score - _TIE:
-            members = start
-        best = max(best, offset + score)
-        # A size that was found beside other effects took up what these explain: beside them the noise may be likelier.
-        others = (one for score, _, one in known if score > known[0][0] - WINDOW)
-        rivals = [one for one in dict.fromkeys(others) if one not in asked and one != members][:1]
-    if members not in asked:
-        asked[members] = board.noises(members, tried, best)
-    kept = [(noise, one) for score, noise, one in known if score > known[0][0] - WINDOW]
-    return [noise for noise, _ in kept], list(dict.fromkeys([members, *(one for _, one in kept)])), asked[members]
-
-
-def _kinds(known: Sequence[tuple[float, NoiseModel, Members]]) -> list[NoiseTerm]:
-    """Kinds of noise that are known beside some effects, each once."""
-    return list({t.identity: t for _, noise, _ in known for t in noise.terms}.values())
-
-
-def _noises_beside(
-    board: Board[E], members: Members, tried: Sequence[NoiseTerm] | None, best: float, known: Sequence[NoiseTerm]
-) -> list[tuple[float, NoiseModel]]:
-    """Noises beside effects; of kinds that are `known` beside others alone where these leave them far behind."""
-    if tried is None and known:
-        found = board.noises(members, known, best)
-        if max((score for score, _ in found), default=-np.inf) < best - _FAR:
-            return found
-    return board.noises(members, tried, best)
-
-
-def _in_same_noise(
-    board: Board[E], starts: Sequence[Members], noises: Sequence[NoiseModel]
-) -> tuple[list[NoiseModel], Members]:
-    """Climb again in the likeliest noises that are known: a finer time constant changes little of them."""
-    found = []
-    for place, noise in enumerate(noises[:_FEW]):
-        offset, data = board.data(noise)
-        score, members = max((best_from(data, one, of_two=False) for one in starts), key=lambda t: t[0])
-        found.append((offset + score, -place, members))
-    found.sort(reverse=True)
-    order = [-place for _, place, _ in found]
-    return [*(noises[k] for k in order), *noises[_FEW:]], found[0][2]
-
-
-def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: NoiseModel, members: Members) -> None:
-    """Add a noise to those that are known; of two that are nearly the same the likelier one stays."""
-    for place, (old, other, _) in enumerate(known):
-        if same_noise(noise, other):
-            if score > old:
-                known[place] = (score, noise, members)
-            return
-    known.append((score, noise, members))
-
-
-def without_drifts(board: Board[E], members: Members) -> Members:
-    """Leave out what noise with a memory may imitate."""
-    first = len(board.evidence.weight)
-    effects = [board.evidence.candidates[column - first].effect for column in board.columns(members)]
-    drifts = [e.bias_drift or e.wander_like or e.scope == "recording" for e in effects]
-    return tuple(m for m, drift in zip(members, drifts, strict=True) if not drift)
