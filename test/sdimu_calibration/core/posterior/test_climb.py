@@ -102,6 +102,6 @@ def test_an_effect_that_is_as_likely_as_noise_is_in_the_window_with_its_noise():
     data = [board.data(noise) for noise in noises]
     found = window([d for _, d in data], [offset for offset, _ in data], ends)
     # No move leads from nothing in the one noise to the effect in the other: it must be a start.
-    of_effect = [score for (number, members), score in found.items() if noises[number] != LIKE_AN_EFFECT and members]
-    assert max(of_effect) == pytest.approx(max(found.values()), abs=WINDOW)
+    of_effect = [score for (number, members), score in found.items() if noises[number] == NARROW and members]
+    assert max(of_effect) == pytest.approx(as_likely - 0.3)
     assert not any(noises[number] == WIDE and not members for number, members in found)

@@ -93,12 +93,11 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     progress("candidates", 0.4)
     first = run_round(request, ground, False, {}, None)
     within = _moving_within(request, first)
-    if within is not None:
-        return search_until_stable(within, _first_ground(within, progress), None, progress)
-    request, done = search_until_stable(request, ground, first, progress)
-    within = _moving_within(request, done)
     if within is None:
-        return request, done
+        request, done = search_until_stable(request, ground, first, progress)
+        within = _moving_within(request, done)
+        if within is None:
+            return request, done
     return search_until_stable(within, _first_ground(within, progress), None, progress)
 
 

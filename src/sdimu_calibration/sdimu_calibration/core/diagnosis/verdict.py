@@ -15,8 +15,7 @@ from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
 from sdimu_calibration.core.evidence.consistency import SLOW_S, Consistency
 from sdimu_calibration.core.handheld.run_scatter import FORCE, RATE, TURN
-from sdimu_calibration.core.noise_term import FOLLOWS, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel
+from sdimu_calibration.core.noise_term import DRAWN, FOLLOWS, NoiseTerm
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.probability import in_percent
@@ -172,7 +171,8 @@ def _unexplained(d: Diagnosis, names: str) -> str:
         # Noise that every sensor has is no part of what is unexplained.
         account = " and ".join(("it", *drawn))
         return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
-    may_be = "" if names or not NoiseModel(d.found.noise).wanders_alone else _may_be(d.probabilities)
+    like_effects = any(term.kind in DRAWN for term in d.found.noise)
+    may_be = "" if names or like_effects else _may_be(d.probabilities)
     if may_be:
         return f"Something is missing, and which is open: {may_be}."
     if drawn:
@@ -197,7 +197,7 @@ def _may_be(told: Probabilities | None) -> str:
     if told is None:
         return ""
     shares = [(one.probability, _in_words(one.label)) for f in told.families for one in f.members]
-    like = [one for one in told.noise if one.kind in LIKE_EFFECTS]
+    like = [one for one in told.noise if one.kind in DRAWN]
     if 1.0 - told.nothing + sum(one.probability for one in like) < PROBABLE:
         return ""
     shares += [(one.probability, NoiseTerm(one.triad, one.kind, axes=one.axes).words) for one in like]

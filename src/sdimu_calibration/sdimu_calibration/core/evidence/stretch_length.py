@@ -27,7 +27,8 @@ MOVES = 0.5
 as much changes a sigma by a fifth."""
 _STRONG = 3.0
 """Mean square (1) of the errors of a triad in all stretches over their white noise below which nobody looks: in white
-noise it is one, and what moves within a stretch moves more from stretch to stretch."""
+noise it is one, and what moves within a stretch moves more from stretch to stretch. The mean of an accelerometer is a
+tilt, so that weak noise of it is overlooked; a diagnosis judges the noise that it finds once more."""
 
 
 def wander_of(evidence: LinearEvidence) -> Wander:

@@ -19,10 +19,10 @@ from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
 from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
 from sdimu_calibration.core.posterior.models import Members, gains
-from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel, log_odds, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, usual_sizes
 from sdimu_calibration.core.posterior.prior import Prior, prior_of, twins
 
 _NEAR = 6.0
@@ -199,9 +199,7 @@ class SetBoard(Board[SetEvidence]):
 
     def _of_unit(self, best: tuple[int, ...]) -> list[tuple[int, ...]]:
         """Choices in which one kind of noise is in all recordings; each recording else as near `best` as it can."""
-        kinds = [
-            [{kind_of(t) for t in one.noise.terms if t.kind not in LIKE_EFFECTS} for one in own] for own in self.rivals
-        ]
+        kinds = [[{kind_of(t) for t in one.noise.terms if t.kind not in DRAWN} for one in own] for own in self.rivals]
         out = []
         for kind in sorted(set.intersection(*(set().union(*own) for own in kinds))):
             chosen = []

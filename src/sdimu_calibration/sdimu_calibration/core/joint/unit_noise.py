@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import LIKE_EFFECTS, NoiseModel, Sizes
+from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes
 
 _OF_UNIT = 0.5
 """Probability (1) that noise of a kind is of the unit: sensors are the same in all recordings, benches are not."""
@@ -52,7 +52,7 @@ def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes, odds: Mapping[str,
     for noise in own:
         for term, share in zip(noise.terms, noise.shares, strict=True):
             # What hangs on attitude or turns is of the sensors no more than of the bench.
-            if term.kind in LIKE_EFFECTS or len(own) < 2:
+            if term.kind in DRAWN or len(own) < 2:
                 total += share
             else:
                 terms.setdefault(kind_of(term), []).append((term, share))

@@ -63,7 +63,9 @@ def climbed(
     partly: set[Members] = set()
     for _ in range(_ROUNDS):
         beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
-        wanted = [one for one in dict.fromkeys([*beside, *rivals]) if one not in asked or one in partly & {members}]
+        wanted = [
+            one for one in dict.fromkeys([*beside, *rivals]) if one not in asked or (one == members and one in partly)
+        ]
         if members not in wanted and not rivals:
             break
         # Few effects first: beside many that white noise asked for, noise that is far behind is given up at once.

@@ -81,9 +81,6 @@ _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
-LIKE_EFFECTS = frozenset((*FOLLOWS, STOP, TURN, SHIFT))
-"""Kinds of noise that hang on attitude, rate, turns or temperature: an effect that is not in the model looks like
-them."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
 SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count))
@@ -122,7 +119,7 @@ class NoiseModel:
     @property
     def wanders_alone(self) -> bool:
         """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
-        return not any(t.kind in LIKE_EFFECTS for t in self.terms)
+        return not any(t.kind in DRAWN for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -384,5 +381,5 @@ def explored(
     near = [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
     if any(noise.wanders_alone for _, noise in near):
         return near
-    wandering = [term for term in search.tried if term.kind not in LIKE_EFFECTS]
+    wandering = [term for term in search.tried if term.kind not in DRAWN]
     return [*near, *explored(information, cut, usual, wandering)[:1]]
