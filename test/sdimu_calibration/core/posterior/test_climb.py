@@ -37,7 +37,7 @@ class Board:
         self.levels = {WHITE: (0.0, 0.0), WIDE: (900.0, 4.0), LIKE_AN_EFFECT: (932.0, 0.0), NARROW: (890.0, 10.0)}
         self.levels[WALK] = (905.0, 10.0)
         self.beside_none = [(932.0, LIKE_AN_EFFECT), (900.0, WIDE)]
-        self.walk, self.asked = walk, []
+        self.walk, self.asked, self.instead = walk, [], []
 
     def data(self, noise):
         offset, pull = self.levels[noise]
@@ -45,6 +45,9 @@ class Board:
 
     def columns(self, members):
         return [k for k, _ in members]
+
+    def instead_of(self, likeliest, others):
+        return self.instead if likeliest == LIKE_AN_EFFECT and WIDE in others else []
 
     def gain(self, noise):
         """Log posterior of the effect over that of none."""
@@ -105,3 +108,16 @@ def test_an_effect_that_is_as_likely_as_noise_is_in_the_window_with_its_noise():
     of_effect = [score for (number, members), score in found.items() if noises[number] == NARROW and members]
     assert max(of_effect) == pytest.approx(as_likely - 0.3)
     assert not any(noises[number] == WIDE and not members for number, members in found)
+
+
+def test_an_effect_that_shows_in_none_of_the_noises_beside_nothing_is_looked_for_without_each_term():
+    """Wide noise has taken up the effect; beside the term that follows the rate it is narrower."""
+    board = Board()
+    board.levels[WIDE] = (900.0, 0.0)
+    assert climbed(board, [()])[1] == [()]
+    board.instead = [NARROW]
+    board.levels[NARROW] = (890.0, 11.0)
+    assert board.levels[NARROW][0] + board.gain(NARROW) - board.levels[LIKE_AN_EFFECT][0] > WINDOW
+    noises, ends, _ = climbed(board, [()])
+    assert noises[0] == NARROW
+    assert [k for k, _ in ends[0]] == [0]

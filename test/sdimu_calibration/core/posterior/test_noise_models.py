@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import ODDS, SHARE, explored, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import ODDS, SHARE, NoiseModel, explored, instead_of, usual_sizes
 from sdimu_calibration.storage.files.config import load_imu
 
 TRIED = tuple(NoiseTerm(triad, kind) for triad in TRIADS for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT))
@@ -140,3 +142,38 @@ def test_the_likeliest_noise_without_terms_like_effects_is_found_where_all_other
     # No other such noise is a better place to look for effects.
     alone = [t for t in TRIED if t.kind in {RANDOM_WALK, FLICKER}]
     assert score == pytest.approx(explored(information, cut, usual, alone)[0][0])
+
+
+def test_each_term_may_stand_for_an_effect_and_other_drawn_terms_in_its_place_are_smaller():
+    shift, stop, walk = (NoiseTerm("gyro", kind, size=2.0) for kind in (SHIFT, STOP, RANDOM_WALK))
+    accel = NoiseTerm("accel", STOP, size=3.0)
+    likeliest = NoiseModel((shift, accel), (-1.0, -2.0))
+    others = [likeliest, NoiseModel((stop, accel), (-3.0, -2.0)), NoiseModel((walk, accel), (-4.0, -2.0))]
+    without = [NoiseModel((accel,), (-2.0,)), NoiseModel((shift,), (-1.0,))]
+    smaller = NoiseModel((replace(stop, size=1.0), accel), (-3.0, -2.0))
+    assert instead_of(likeliest, others) == [*without, smaller]
+
+
+def shifted_once(rng, cut, size):
+    """Bias drawn anew at each stop, and shifted by three times as much half way."""
+    n, J = len(cut), 1.0 / size**2
+    root = np.linalg.cholesky(kernel(STOP, 0.0, cut) + 1e-12 * np.eye(n))
+    error = np.zeros((n, 6))
+    error[:, :3] = size * root @ rng.standard_normal((n, 3))
+    error[n // 2 :, 0] += 3.0 * size
+    d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n)
+    return NoiseInformation(J * np.eye(6 * n), d, 0.0)
+
+
+def test_noise_with_other_drawn_terms_in_the_place_of_the_likeliests_is_found_far_behind_it(cut, usual):
+    """The shift makes most of noise that is drawn anew at each stop: without it that noise is far behind."""
+    tried, behind = [t for t in TRIED if t.kind in {STOP, TURN, SHIFT}], []
+    for seed in range(6):
+        information = shifted_once(np.random.default_rng(seed), cut, usual.centre["gyro", STOP])
+        first, *others = explored(information, cut, usual, tried)
+        alone = [score for score, noise in others if {t.kind for t in noise.terms} == {STOP}]
+        behind += [first[0] - score for score in alone]
+        assert len(alone) <= 1
+    # In one of the six it is more than 30 behind.
+    assert len(behind) >= 4
+    assert min(behind) > 6.0

@@ -98,3 +98,16 @@ def test_the_next_search_begins_with_the_likeliest_model_in_each_noise():
     walk = NoiseModel((NoiseTerm("gyro", "random_walk", size=1e-6),), (-1.0,))
     found = window(((SHORT,), 0.6), ((), 0.39), ((OTHER,), 0.01), noises=(NoiseModel(), walk, NoiseModel(())))
     assert found.starts() == [{KEYS[SHORT]: (0, False)}, {KEYS[SHORT]: (0, False)}, {}]
+
+
+def test_what_models_hold_instead_is_of_the_class_though_it_fits_worse_in_the_noise_of_the_told_model():
+    """The other effect is there beside a smaller noise: one of the two is certain, and which is open."""
+    small = NoiseModel((NoiseTerm("gyro", "stop", size=1e-7),), (-1.0,))
+    found = window(((QUADRATIC,), 0.6), ((OTHER,), 0.39), ((), 0.01), noises=(NoiseModel(), small, NoiseModel()))
+    assert found.classes == ((OTHER,),)
+    assert found.of_class(0) == pytest.approx(0.99)
+
+
+def test_an_effect_that_has_nothing_to_do_with_another_is_not_told_in_its_place():
+    apart = ((QUADRATIC,), 0.3), ((QUADRATIC, OTHER), 0.3), ((OTHER,), 0.2), ((), 0.2)
+    assert window(*apart).classes == ((),)

@@ -91,7 +91,6 @@ def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
     held : bool
         Whether it holds where it was not fitted; False: nothing of it is called certain.
     """
-    names = listed(c.label for c in d.chosen)
     if d.verdict == Verdict.CONSISTENT:
         return _consistent(d)
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
@@ -101,7 +100,7 @@ def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
         grave = [f.text for f in d.findings if f.grave]
         return f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found)
     if d.verdict == Verdict.UNEXPLAINED:
-        return _unexplained(d, names)
+        return _unexplained(d, found, held)
     if not d.chosen and d.probabilities is not None:
         return something_missing(d.probabilities)
     every = _graded(d, [one for one in found if not _is_fault(one)])
@@ -157,17 +156,17 @@ def _consistent(d: Diagnosis) -> str:
     return f"{clean}; but {odd}." if odd else f"{clean}."
 
 
-def _unexplained(d: Diagnosis, names: str) -> str:
+def _unexplained(d: Diagnosis, found: Sequence[Found], held: bool) -> str:
     if d.rungs and d.rungs[-1].scatter is not None:
         most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}."
+    names = listed(c.label for c in d.chosen)
+    told = in_grades(_graded(d, found), "Certain" if held else _FITTED) if names else ""
     follows = [term_in_words(term) for term in d.found.noise if term.kind in FOLLOWS]
     drawn = [term_in_words(term) for term in d.found.noise if term.kind not in FOLLOWS]
     if follows:
-        begun = (
-            f"Found, but not all: {names}. What is left is the" if names else "No effect of the catalogue explains the"
-        )
+        begun = f"{told} What is left is the" if names else "No effect of the catalogue explains the"
         # Noise that every sensor has is no part of what is unexplained.
         account = " and ".join(("it", *drawn))
         return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
@@ -176,7 +175,7 @@ def _unexplained(d: Diagnosis, names: str) -> str:
     if may_be:
         return f"Something is missing, and which is open: {may_be}."
     if drawn:
-        begun = f"Found, but not all: {names}. What is left" if names else "Something is missing that"
+        begun = f"{told} What is left" if names else "Something is missing that"
         return (
             f"{begun} looks like {' and '.join(drawn)}: a cause outside the catalogue, or a bias that does so; the "
             "sigmas take it into account."

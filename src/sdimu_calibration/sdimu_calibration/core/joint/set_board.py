@@ -245,6 +245,11 @@ class SetBoard(Board[SetEvidence]):
         wanders = any(noise.wanders_alone for _, noise in near)
         return near if wanders else [*near, next(one for one in every if one[1].wanders_alone)]
 
+    def instead_of(self, likeliest: NoiseModel, others: Sequence[NoiseModel]) -> Sequence[NoiseModel]:
+        """None: each recording has the noises that were found in it by itself."""
+        del likeliest, others
+        return ()
+
     def noise_of(self, fit: SetFit, likeliest: NoiseModel) -> NoiseModel:
         """Find the noise in which a fit stands: of each recording that with the terms it has learned, near in size.
 

@@ -23,7 +23,7 @@ from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, explored, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, explored, instead_of, usual_sizes
 from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE, WIDTHS, Prior, prior_of
 
 _SHARPER = 1.0
@@ -279,6 +279,10 @@ class Board(Generic[E]):
         alone = self.data(NoiseModel())[1].at(members).of_any_sign
         found = explored(information, self.wander.cut, usual_sizes(self.evidence.imu), tried, max(rival - alone, 0.0))
         return [(alone + score, noise) for score, noise in found]
+
+    def instead_of(self, likeliest: NoiseModel, others: Sequence[NoiseModel]) -> Sequence[NoiseModel]:
+        """Noises in which an effect is seen that a term of the likeliest one stands for."""
+        return instead_of(likeliest, others)
 
     def finer_variant(self, members: Members, place: int, noise: NoiseModel) -> Effect | None:
         """Make the scan finer about a member of a model; None where no variant gains as much as `_SHARPER`."""

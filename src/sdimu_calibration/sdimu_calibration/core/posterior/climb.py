@@ -26,7 +26,8 @@ kind of noise that is known beside no others adds less."""
 _NOISES = 6
 """Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 _FEW = 2
-"""Number of noises in which effects are looked for again when a time constant was sharpened: the likeliest."""
+"""Number of noises in which effects are looked for again when a time constant was sharpened, and of effects that one
+term of noise may stand for: the likeliest."""
 
 
 def climbed(
@@ -97,8 +98,9 @@ def climbed(
             members = start
         best = max(best, offset + score)
         # A size that was found beside other effects took up what these explain: beside them the noise may be likelier.
-        others = (one for score, _, one in known if score > known[0][0] - WINDOW)
-        rivals = [one for one in dict.fromkeys(others) if one not in asked and one != members][:1]
+        others = [(score, one) for score, _, one in known] + _in_place(board, ranked)
+        others = sorted((one for one in others if one[0] > known[0][0] - WINDOW), key=lambda one: -one[0])
+        rivals = [one for one in dict.fromkeys(one for _, one in others) if one not in asked and one != members][:1]
     if members not in asked or members in partly:
         asked[members] = board.noises(members, tried, best)
     kept = [(noise, one) for score, noise, one in known if score > known[0][0] - WINDOW]
@@ -145,6 +147,23 @@ def in_same_noise(
     found.sort(reverse=True)
     order = [-place for _, place, _ in found]
     return [*(noises[k] for k in order), *noises[_FEW:]], found[0][2]
+
+
+def _in_place(board: Board[E], ranked: Sequence[tuple[float, NoiseModel, Members]]) -> list[tuple[float, Members]]:
+    """Look for a few effects where a term of the likeliest noise may stand for them.
+
+    Returns
+    -------
+    list of (float, tuple of (int, int))
+        Log posterior and effects.
+    """
+    _, likeliest, members = ranked[0]
+    out = []
+    for noise in board.instead_of(likeliest, [noise for _, noise, _ in ranked]):
+        offset, data = board.data(noise)
+        gain, found = best_from(data, members, of_two=False, most=len(members) + _FEW)
+        out.append((offset + gain, found))
+    return out
 
 
 def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: NoiseModel, members: Members) -> None:

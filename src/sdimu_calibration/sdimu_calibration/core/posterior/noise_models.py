@@ -83,6 +83,10 @@ _SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
+_SMALLER = 0.5
+"""Size of noise beside an effect over that found beside none (1): the effect made most of it."""
+_MOST_DRAWN = 6
+"""Number of noises with other drawn terms that are looked at (1): of each triad three, one of each cause."""
 SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count))
 """Sensors of a triad that an unknown function may be of, likely alike: nobody knows what causes it."""
 
@@ -120,6 +124,10 @@ class NoiseModel:
     def wanders_alone(self) -> bool:
         """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
         return not any(t.kind in DRAWN for t in self.terms)
+
+    def drawn_in(self, triad: str) -> frozenset[Identity]:
+        """Say what the terms of a triad are that hang on attitude, rate or turns."""
+        return frozenset(t.identity for t in self.terms if t.triad == triad and t.kind in DRAWN)
 
 
 @dataclass(frozen=True)
@@ -311,6 +319,54 @@ class _Search:
         return max(self.seen.values(), key=lambda found: found.score)
 
 
+def _otherwise_drawn(ranked: Sequence[_Found]) -> list[_Found]:
+    """Noises with other drawn terms in the place of the likeliest's: with an effect beside it one may be likelier."""
+    best, out = ranked[0].noise, []
+    for triad in TRIADS:
+        known = {frozenset(), best.drawn_in(triad)}
+        for found in ranked if best.drawn_in(triad) else ():
+            own = found.noise.drawn_in(triad)
+            if own not in known and found.score > ranked[0].score - _BEHIND:
+                known.add(own)
+                out.append(found)
+    return out[:_MOST_DRAWN]
+
+
+def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
+    """List noises in which an effect is seen that a term of the likeliest noise stands for.
+
+    Each term may be one: the others have their sizes then. Where other drawn terms come in its place, their size beside
+    no effect has taken up the effect: they are made smaller.
+
+    Parameters
+    ----------
+    others : sequence of NoiseModel
+        Noises that are known, the likeliest first.
+
+    Returns
+    -------
+    list of NoiseModel
+    """
+    out = [_without(likeliest, place) for place in range(len(likeliest.terms))]
+    for triad in TRIADS:
+        own, first = likeliest.drawn_in(triad), dict[frozenset[Identity], NoiseModel]()
+        for noise in others if own else ():
+            first.setdefault(noise.drawn_in(triad), noise)
+        out += [_smaller(noise, triad) for drawn, noise in first.items() if drawn not in {own, frozenset()}]
+    return out
+
+
+def _without(noise: NoiseModel, place: int) -> NoiseModel:
+    terms, shares = noise.terms, noise.shares
+    return NoiseModel(terms[:place] + terms[place + 1 :], shares[:place] + shares[place + 1 :])
+
+
+def _smaller(noise: NoiseModel, triad: str) -> NoiseModel:
+    return replace(
+        noise, terms=tuple(replace(t, size=_SMALLER * t.size) if t.triad == triad else t for t in noise.terms)
+    )
+
+
 def _is_in(term: NoiseTerm, terms: Sequence[NoiseTerm]) -> bool:
     """Whether a sensor of a term has noise of its kind already."""
     return any(t.kind == term.kind and set(t.axes) & set(term.axes) for t in terms)
@@ -351,8 +407,9 @@ def explored(
     Returns
     -------
     list of (float, NoiseModel)
-        Log posterior of each over white noise (1), the likeliest first. The last one is far behind where all others
-        have terms that stand in the place of effects: it is the likeliest without them.
+        Log posterior of each over white noise (1), the likeliest first. Then those that have other drawn terms in the
+        place of its drawn ones. The last one is far behind where all others have terms that stand in the place of
+        effects: it is the likeliest without them.
     """
     search = _Search(information, cut, usual, tried)
     best = search.keep(_Found(NoiseModel(), 0.0))
@@ -379,6 +436,7 @@ def explored(
     search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
     near = [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
+    near += [(found.score, found.noise) for found in _otherwise_drawn(ranked) if found.score <= ranked[0].score - _NEAR]
     if any(noise.wanders_alone for _, noise in near):
         return near
     wandering = [term for term in search.tried if term.kind not in DRAWN]

@@ -33,6 +33,11 @@ change what is told."""
 _SEEN = 0.003
 """Probability of a noise (1) from which its kinds are looked for when the point has moved: those below it together are
 less than is told."""
+_INSTEAD = 0.05
+"""Probability (1) of models without a class from which an effect that they hold is told as one of it: one in twenty."""
+_SELDOM = 0.1
+"""Probability of an effect beside a class, over that where the class is not (1), up to which it stands in its place: of
+two that have nothing to do with each other it is one."""
 _MOST_SHARPENED = 20
 """Number of times or time constants that are put between those of the scan at most: each takes a climb."""
 
@@ -175,12 +180,26 @@ class Posterior(Generic[E]):
 
     @cached_property
     def classes(self) -> tuple[tuple[int, ...], ...]:
-        """What the data cannot tell from each member of the told model, and what of its family stands in its place.
+        """What the data cannot tell from each member of the told model, and what else stands in its place.
 
-        Candidates; those that fit as well come first, the likeliest before the others.
+        Candidates; those that fit as well come first, then others of its family, then those that models hold where none
+        of these is. The likeliest come before the others.
         """
-        alike = self._classes_of(self.told)
-        return tuple((*own[1:], *self._in_place_of(own)) for own in alike)
+        alike = [(*own, *self._in_place_of(own)) for own in self._classes_of(self.told)]
+        return tuple((*own[1:], *self._instead_of(own)) for own in alike)
+
+    def _instead_of(self, alike: tuple[int, ...]) -> list[int]:
+        """Candidates that models hold where they hold none of a class, and hardly ever beside it."""
+        has = self._holds[:, list(alike)].any(axis=1)
+        with_it, without = self._weights * has, self._weights * ~has
+        if without.sum() < _INSTEAD:
+            return []
+        told = {number for number, _ in self.told.members}
+        share = {k: float(without @ self._holds[:, k]) for k in self.held if k not in told}
+        # Its probability beside the class is at most a share of that where the class is not.
+        most = _SELDOM * with_it.sum() / without.sum()
+        out = [k for k, p in share.items() if p >= _INSTEAD and float(with_it @ self._holds[:, k]) <= most * p]
+        return sorted(out, key=lambda k: -share[k])
 
     def _in_place_of(self, alike: tuple[int, ...]) -> list[int]:
         """Members of the family of a class's first candidate that models hold instead of it, rather than beside it."""

@@ -33,7 +33,7 @@ _LEAST_GAIN = 1e-6
 """Log posterior (1) that a move must gain: less is rounding, and would go round in circles."""
 
 
-def best_from(data: Data, start: Members, of_two: bool = True) -> tuple[float, Members]:
+def best_from(data: Data, start: Members, of_two: bool = True, most: int = MOST_EFFECTS) -> tuple[float, Members]:
     """Climb from a model to the best one that moves lead to.
 
     Parameters
@@ -42,6 +42,8 @@ def best_from(data: Data, start: Members, of_two: bool = True) -> tuple[float, M
         Model to begin with.
     of_two : bool
         Also moves of two members at once.
+    most : int
+        Number of members to stop at.
 
     Returns
     -------
@@ -50,7 +52,7 @@ def best_from(data: Data, start: Members, of_two: bool = True) -> tuple[float, M
     members : tuple of (int, int)
     """
     here = data.at(start)
-    while len(here.members) < MOST_EFFECTS:
+    while len(here.members) < most:
         score, members = _best_neighbour(here)
         if of_two and not score > here.score + _LEAST_GAIN:
             score, members = _of_two(here)
