@@ -23,7 +23,8 @@ class Ideal:
 
     inner = row_times = None
 
-    def __init__(self) -> None:
+    def __init__(self, e: np.ndarray | None = None) -> None:
+        self.e = np.zeros(7200) if e is None else e
         self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
 
     def conditions(self, _cut):
@@ -33,6 +34,17 @@ class Ideal:
         t = np.arange(0.5, 1200.0)
         inside = (t[:, None] > cut.start) & (t[:, None] < cut.end)
         return np.kron(inside, np.eye(6))
+
+
+class Tilting(Ideal):
+    """The same of which each rest has a tilt that is free."""
+
+    def constant_signature(self, cut):
+        U = super().constant_signature(cut).astype(float)
+        for k in range(10):
+            own = np.kron((np.arange(1200) // 120 == k).astype(float)[:, None], np.eye(6)[:, 3:])
+            U -= own @ np.linalg.lstsq(own, U, rcond=None)[0]
+        return U
 
 
 def test_a_half_moves_against_the_other_by_the_allan_variance():
@@ -57,17 +69,23 @@ def test_a_half_moves_against_the_other_by_the_allan_variance():
 def test_what_a_tilt_takes_of_the_mean_hides_no_movement():
     """The mean of an accelerometer over a stretch is a tilt; the difference of its halves is none."""
 
-    class Tilting(Ideal):
-        def constant_signature(self, cut):
-            U = super().constant_signature(cut).astype(float)
-            # Beside a tilt that is free in each rest.
-            for k in range(10):
-                own = np.kron((np.arange(1200) // 120 == k).astype(float)[:, None], np.eye(6)[:, 3:])
-                U -= own @ np.linalg.lstsq(own, U, rcond=None)[0]
-            return U
-
     walk = NoiseTerm("accel", "random_walk", size=0.1)
     assert moves_within(Wander.of(Tilting()), [walk]) == pytest.approx(moves_within(Wander.of(Ideal()), [walk]))
+
+
+@pytest.mark.parametrize("kind", [Ideal, Tilting])
+@pytest.mark.parametrize("size", [0.0, 0.1])
+def test_halves_differ_by_their_white_noise_and_what_moves(kind, size):
+    """Of 60 tests the mean square of twelve differences each."""
+    rng = np.random.default_rng(31)
+    moved = []
+    for _ in range(60):
+        walk = np.cumsum(size * rng.standard_normal((1200, 6)), axis=0)
+        moved.append(Wander.of(kind((walk + rng.standard_normal((1200, 6))).ravel())).moved)
+    terms = [NoiseTerm("accel", "random_walk", size=size)] if size else []
+    expected = 1.0 + moves_within(Wander.of(kind()), terms)
+    scatter = expected * np.sqrt(2.0 / 12.0 / 60.0)
+    assert np.abs(np.mean(moved, axis=0) - expected).max() < 4.0 * scatter
 
 
 def test_stretches_are_halved_where_noise_moves_within_them():

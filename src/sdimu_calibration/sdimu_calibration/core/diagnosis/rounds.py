@@ -27,7 +27,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
 from sdimu_calibration.core.evidence.wander import Wander
-from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import NOT_TRUSTED
@@ -44,6 +44,9 @@ UNEXPLAINED_P = 1e-3
 MOST_ROUNDS = 4
 """Number of rounds at most, where a round may choose any number of effects: a choice that does not stand by then goes
 to and fro between effects that look alike."""
+_DRAWN = 0.02
+"""Probability of noise of a triad (1) that is drawn anew or follows something, from which equations are looked for:
+those that are missed below it are one in fifty."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
@@ -70,80 +73,56 @@ class Round:
 
     @property
     def wants_equations(self) -> bool:
-        """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
+        """Whether something is left, took suspiciously many terms or may be noise that is drawn, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
         many = len(self.found.chosen) >= _MANY
-        return self.left_after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
+        return self.left_after.p_value < UNEXPLAINED_P or many or refused or self._may_be_drawn
+
+    @property
+    def _may_be_drawn(self) -> bool:
+        """Whether noise is told that may be drawn anew, or follow something: what wanders alone is no equation."""
+        window = self.found.posterior
+        if window is None or not self.found.noise:
+            return False
+        return any(window.of_noise(triad, DRAWN) > _DRAWN for triad in TRIADS)
 
 
 def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
-    """Search, and again in noise that moves within stretches where the noise that was found does.
-
-    Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
-    The first round finds both; where its noise does not move, that of the last one is asked again.
-
-    Returns
-    -------
-    request : Request
-        With the stretches of the last search.
-    done : Round
-        As of `search_until_stable`.
-    """
-    ground = _first_ground(request, progress)
-    progress("candidates", 0.4)
-    first = run_round(request, ground, False, {}, None)
-    within = _moving_within(request, first)
-    if within is None:
-        request, done = search_until_stable(request, ground, first, progress)
-        within = _moving_within(request, done)
-        if within is None:
-            return request, done
-    return search_until_stable(within, _first_ground(within, progress), None, progress)
-
-
-def _moving_within(request: Request, done: Round) -> Request | None:
-    """Return the request in noise that moves within stretches; None where the noise of a round does not."""
-    if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
-        return None
-    wander = wander_in(request.base.bare, done.found.noise)
-    return None if wander.inner is None else replace(request, wander=wander)
-
-
-def search_until_stable(
-    request: Request, ground: Ground, first: Round | None, progress: Progress
-) -> tuple[Request, Round]:
     """Repeat rounds until the choice stands, then fit it in its noise.
 
-    Parameters
-    ----------
-    ground : Ground
-        Of the first round.
-    first : Round, optional
-        The first round, where it was run already.
+    Where the noise that was found moves within stretches, the rounds go on in stretches, or in noise, that hold it.
+    Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
 
     Returns
     -------
     request : Request
-        With functions of the attitude in its wander, where the last round had them.
+        With the stretches, and functions of the attitude in its wander, of the last round.
     done : Round
         The last one; its fit holds what it chose.
     """
-    own, asked, stood = False, False, False
-    limits = {} if first is None else {False: first.found.threshold}
+    ground = _first_ground(request, progress)
+    own, asked, stood, finer = False, False, False, False
+    limits: dict[bool, float] = {}
     done: Round | None = None
-    for turn in range(MOST_ROUNDS):
-        beside = False
-        progress("candidates", min(0.8, 0.4 + 0.1 * turn))
-        done = first if first and not turn else run_round(request, ground, own, limits, done)
+    left, part = MOST_ROUNDS, 0.4
+    while left:
+        left, beside = left - 1, False
+        progress("candidates", part := min(0.8, part + 0.1))
+        done = run_round(request, ground, own, limits, done)
+        within = None if finer else _moving_within(request, done)
+        if within is not None:
+            request, finer, left, limits = within, True, MOST_ROUNDS, {}
+            ground = fresh_ground(request, ground.fit, ground.tried, own)
+            continue
         if done.wants_equations and not own and not asked:
             asked = True
-            progress("equations", min(0.8, 0.45 + 0.1 * turn))
+            progress("equations", part)
             exact = with_attitude_functions(request, done.found)
             wider = next_ground(exact, ground, ground.fit, ground.tried, True, done.found)
             wide = run_round(exact, wider, True, limits, done)
             if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
                 # Equations that come near beside a function of the attitude alone were not looked at yet.
-                beside = exact is not request and turn + 1 < MOST_ROUNDS
+                beside = exact is not request and left > 0
                 request, done, own, ground = exact, wide, True, wider
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
         if stood and not beside:
@@ -156,6 +135,14 @@ def search_until_stable(
     done = replace(done, found=replace(with_steps(done.found), stood=stood))
     fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
     return request, replace(done, fit=fit)
+
+
+def _moving_within(request: Request, done: Round) -> Request | None:
+    """Return the request in noise that moves within stretches; None where the noise of a round does not."""
+    if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
+        return None
+    wander = wander_in(request.base.bare, done.found.noise)
+    return None if wander.inner is None else replace(request, wander=wander)
 
 
 def _first_ground(request: Request, progress: Progress) -> Ground:

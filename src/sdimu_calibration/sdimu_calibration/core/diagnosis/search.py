@@ -104,10 +104,10 @@ def search(
     make : callable
         Makes the board, of the parameters of `Board`.
     """
-    if earlier and earlier.joint and earlier.joint.wander is not wander:
-        # Of other stretches neither information nor kinds of noise hold.
-        earlier = None
     joint = earlier.joint if earlier else None
+    if joint and joint.wander is not wander:
+        # Information on the wander in other stretches does not hold.
+        joint = None
     found = posterior(evidence, allowed, wander, joint, earlier.posterior if earlier else None, make)
     board = found.board
     terms = told_noise(found) if tell_noise else ()

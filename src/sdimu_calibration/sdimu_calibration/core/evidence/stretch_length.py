@@ -25,10 +25,6 @@ from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 MOVES = 0.5
 """Ratio of the variance between the halves of a stretch to that of white noise, from which the stretch is halved: half
 as much changes a sigma by a fifth."""
-_STRONG = 3.0
-"""Mean square (1) of the errors of a triad in all stretches over their white noise below which nobody looks: in white
-noise it is one, and what moves within a stretch moves more from stretch to stretch. The mean of an accelerometer is a
-tilt, so that weak noise of it is overlooked; a diagnosis judges the noise that it finds once more."""
 
 
 def wander_of(evidence: LinearEvidence) -> Wander:
@@ -40,11 +36,7 @@ def wander_of(evidence: LinearEvidence) -> Wander:
         In white noise, with the model's columns first.
     """
     wander = Wander.of(evidence)
-    scatter = (wander.U.T @ evidence.e) ** 2
-    seen = np.einsum("ij,ij->j", wander.U, wander.U)
-    at_rest = np.repeat(~wander.cut.turning, 6) & (seen > 0.0)
-    ratio = np.where(at_rest, scatter / np.where(at_rest, seen, 1.0), np.nan).reshape(-1, 2, 3)
-    if not at_rest.any() or np.nanmax(np.nanmean(ratio, axis=(0, 2))) < _STRONG:
+    if wander.moved.reshape(2, 3).mean(axis=1).max() < 1.0 + MOVES:
         return wander
     terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
     return _halved(evidence, replace(wander, learned=terms), terms)

@@ -55,6 +55,9 @@ class Wander:
     """Information on the difference between the halves of a stretch at rest, in the middle of stretches (inverse
     squares of the units, SI), shape (6,). An accelerometer's mean error over a stretch is a tilt, and the data hardly
     show it; they show all of what changes within the stretch."""
+    moved: Floats = field(default_factory=lambda: np.ones(6))
+    """Mean square of the differences between the halves of stretches at rest, over that of white noise (1), shape (6,):
+    it is one where nothing moves within a stretch."""
     _last: dict[Hashable, Modes] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Modes of the noise that was asked for last: a fit is taken back to it again and again."""
 
@@ -115,7 +118,8 @@ class Wander:
         """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
         cut = stretches(evidence.times, share)
         cut = replace(cut, conditions=evidence.conditions(cut))
-        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner, halves=between_halves(evidence, cut))
+        halves, moved = between_halves(evidence, cut)
+        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner, halves=halves, moved=moved)
 
     def with_functions(self, evidence: LinearEvidence) -> Wander:
         """Return the same with functions of the attitude behind its stretches; itself where nobody knows that.
@@ -149,8 +153,8 @@ class Wander:
         return Modes(self.U @ (root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
 
 
-def between_halves(evidence: LinearEvidence, cut: Stretches) -> Floats:
-    """Work out what the data say of the difference between the halves of a stretch at rest.
+def between_halves(evidence: LinearEvidence, cut: Stretches) -> tuple[Floats, Floats]:
+    """Work out how well the data know the difference between the halves of a stretch at rest, and how large it is.
 
     Parameters
     ----------
@@ -159,13 +163,15 @@ def between_halves(evidence: LinearEvidence, cut: Stretches) -> Floats:
 
     Returns
     -------
-    ndarray, shape (6,)
-        Information on the difference for each sensor, the median of stretches (inverse squares of the units, SI); zero
-        where the IMU never rests.
+    information : ndarray, shape (6,)
+        On the difference for each sensor, the median of stretches (inverse squares of the units, SI); zero where the
+        IMU never rests.
+    moved : ndarray, shape (6,)
+        Mean square of the differences over that of white noise (1); one where the IMU never rests.
     """
     rests = np.flatnonzero(~cut.turning)
     if not len(rests):
-        return np.zeros(6)
+        return np.zeros(6), np.ones(6)
     some = rests[np.unique(np.linspace(0, len(rests) - 1, min(len(rests), _LOOKED_AT)).round().astype(int))]
     middle = 0.5 * (cut.start[some] + cut.end[some])
     start = np.column_stack([cut.start[some], middle]).ravel()
@@ -173,4 +179,8 @@ def between_halves(evidence: LinearEvidence, cut: Stretches) -> Floats:
     halves = Stretches(start, end, np.repeat(cut.interval[some], 2), np.zeros(len(start), dtype=bool))
     U = evidence.constant_signature(halves).reshape(-1, len(some), 2, 6)
     change = 0.5 * (U[:, :, 1] - U[:, :, 0])
-    return np.asarray(np.median(np.einsum("nsc,nsc->sc", change, change), axis=0))
+    information = np.einsum("nsc,nsc->sc", change, change)
+    pull = np.einsum("nsc,n->sc", change, evidence.e)
+    seen = information > 0.0
+    moved = np.where(seen, pull**2 / np.where(seen, information, 1.0), 1.0)
+    return np.asarray(np.median(information, axis=0)), np.asarray(moved.mean(axis=0))

@@ -63,7 +63,7 @@ def climbed(
     # Beside which effects only the kinds that were known then were looked for.
     partly: set[Members] = set()
     for _ in range(_ROUNDS):
-        beside = [members, *starts] if settled else [members, without_drifts(board, members), ()]
+        beside = [members, without_drifts(board, members), *(starts if settled else [()])]
         wanted = [
             one for one in dict.fromkeys([*beside, *rivals]) if one not in asked or (one == members and one in partly)
         ]

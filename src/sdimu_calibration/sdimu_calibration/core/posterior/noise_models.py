@@ -187,6 +187,13 @@ def log_odds(times: int) -> dict[str, float]:
     return {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
 
 
+def every_kind(cut: Stretches) -> list[NoiseTerm]:
+    """List every kind of noise that is looked for in a test, without its size."""
+    follows = () if cut.conditions is None else cut.conditions.followed
+    unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in SENSORS]
+    return [*kinds(cut), *unknown]
+
+
 @dataclass(frozen=True)
 class _Found:
     """A noise, and its log-likelihood over white noise."""
@@ -206,9 +213,7 @@ class _Search:
         self, information: NoiseInformation, cut: Stretches, usual: Sizes, tried: Sequence[NoiseTerm] | None
     ) -> None:
         self.information, self.cut, self.usual = information, cut, usual
-        follows = () if cut.conditions is None else cut.conditions.followed
-        unknown = [NoiseTerm(triad, kind, axes=axes) for triad in TRIADS for kind in follows for axes in SENSORS]
-        every = [*kinds(cut), *unknown]
+        every = every_kind(cut)
         self.tried = every if tried is None else list(tried)
         self.log_odds = log_odds(sum(t.kind == MARKOV for t in every) // len(TRIADS))
         self.seen: dict[frozenset[Identity], _Found] = {}

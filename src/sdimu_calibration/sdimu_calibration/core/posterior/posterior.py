@@ -21,7 +21,7 @@ from sdimu_calibration.core.posterior.climb import climbed, in_same_noise
 from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
-from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, every_kind
 from sdimu_calibration.core.posterior.search import WINDOW, window
 from sdimu_calibration.core.posterior.sharpening import hoped, sharpened
 
@@ -298,6 +298,9 @@ def posterior(
     # Functions of the attitude stand in the place of many effects: no search from these leads there.
     wide = before is None or (_has_functions(wander) and not _has_functions(before.board.wander))
     tried = before.tried if before is not None and not wide else None
+    if tried and before is not None and wander is not None and wander is not before.board.wander:
+        # In other stretches a kind that was far behind may not be.
+        tried = every_kind(wander.cut)
     settled = not wide and len(starts) > 0
     noises, ends, beside = climbed(board, starts or [()], tried, settled)
     members = ends[0]
