@@ -9,8 +9,9 @@ import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.noise_kernels import stretches
-from sdimu_calibration.core.evidence.stretch_length import moves_within, wander_in
+from sdimu_calibration.core.evidence.stretch_length import held, moves_within, wander_in
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
@@ -71,6 +72,21 @@ def test_what_a_tilt_takes_of_the_mean_hides_no_movement():
 
     walk = NoiseTerm("accel", "random_walk", size=0.1)
     assert moves_within(Wander.of(Tilting()), [walk]) == pytest.approx(moves_within(Wander.of(Ideal()), [walk]))
+
+
+def test_rows_are_whitened_anew_where_the_noise_that_stands_moves_otherwise():
+    plain, wide = Wander.of(Ideal()), NoiseTerm("gyro", "flicker", size=1.0)
+    weak = replace(wide, size=0.1)
+    assert moves_within(plain, [weak]) < 0.5 < moves_within(plain, [wide])
+    assert held(plain, [weak])
+    assert held(plain, [])
+    assert not held(plain, [wide])
+    whitened = replace(plain, inner=InnerNoise((), (wide,)))
+    assert held(whitened, [wide])
+    assert held(whitened, [replace(wide, size=1.3)])
+    # An effect took the place of most of it, or of all.
+    assert not held(whitened, [replace(wide, size=0.6)])
+    assert not held(whitened, [])
 
 
 @pytest.mark.parametrize("kind", [Ideal, Tilting])

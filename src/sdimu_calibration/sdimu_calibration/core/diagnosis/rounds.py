@@ -25,7 +25,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.stretch_length import MOVES, moves_within, wander_in
+from sdimu_calibration.core.evidence.stretch_length import held, wander_in
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
@@ -44,6 +44,9 @@ UNEXPLAINED_P = 1e-3
 MOST_ROUNDS = 4
 """Number of rounds at most, where a round may choose any number of effects: a choice that does not stand by then goes
 to and fro between effects that look alike."""
+_MOST_WHITENED = 2
+"""Number of times at most that rows are whitened in noise that was found: in that of the first round, then of the
+last."""
 _DRAWN = 0.02
 """Probability of noise of a triad (1) that is drawn anew or follows something, from which equations are looked for:
 those that are missed below it are one in fifty."""
@@ -90,8 +93,9 @@ class Round:
 def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     """Repeat rounds until the choice stands, then fit it in its noise.
 
-    Where the noise that was found moves within stretches, the rounds go on in stretches, or in noise, that hold it.
-    Only noise that stands beside the effects says what moves within stretches: without them it takes in what they do.
+    Where the noise that was found moves within stretches, rows are whitened in it and the rounds go on. Only noise that
+    stands beside the effects says what moves within stretches: without them it takes in what they do. So that of the
+    first round, and that beside what stands, are looked at.
 
     Returns
     -------
@@ -101,7 +105,7 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
         The last one; its fit holds what it chose.
     """
     ground = _first_ground(request, progress)
-    own, asked, stood, finer = False, False, False, False
+    own, asked, stood, whitened = False, False, False, 0
     limits: dict[bool, float] = {}
     done: Round | None = None
     left, part = MOST_ROUNDS, 0.4
@@ -109,9 +113,12 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
         left, beside = left - 1, False
         progress("candidates", part := min(0.8, part + 0.1))
         done = run_round(request, ground, own, limits, done)
-        within = None if finer else _moving_within(request, done)
+        stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
+        first = left == MOST_ROUNDS - 1 and not whitened
+        asks = (first or stood) and not own and whitened < _MOST_WHITENED
+        within = _whitened(request, done) if asks else None
         if within is not None:
-            request, finer, left, limits = within, True, MOST_ROUNDS, {}
+            request, whitened, left, limits = within, whitened + 1, MOST_ROUNDS, {}
             ground = fresh_ground(request, ground.fit, ground.tried, own)
             continue
         if done.wants_equations and not own and not asked:
@@ -137,12 +144,12 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     return request, replace(done, fit=fit)
 
 
-def _moving_within(request: Request, done: Round) -> Request | None:
-    """Return the request in noise that moves within stretches; None where the noise of a round does not."""
-    if request.wander is None or moves_within(request.wander, done.found.noise) < MOVES:
+def _whitened(request: Request, done: Round) -> Request | None:
+    """Return the request in what moves within stretches of the noise of a round; None where that is known."""
+    if request.wander is None or held(request.wander, done.found.noise):
         return None
     wander = wander_in(request.base.bare, done.found.noise)
-    return None if wander.inner is None else replace(request, wander=wander)
+    return None if wander.inner is request.wander.inner else replace(request, wander=wander)
 
 
 def _first_ground(request: Request, progress: Progress) -> Ground:

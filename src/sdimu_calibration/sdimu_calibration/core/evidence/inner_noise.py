@@ -53,6 +53,8 @@ class InnerNoise:
     """Whitens rows in noise that moves within stretches."""
 
     parts: tuple[_Part, ...]
+    terms: tuple[NoiseTerm, ...] = ()
+    """The noise, with its sizes."""
 
     def whitened(self, columns: Floats) -> Floats:
         """Multiply with ``(I + V C V')^-1/2``, V the signatures of the cosines and C their covariance.
@@ -105,7 +107,7 @@ def inner_noise(t: Floats, signature: Signature, cut: Stretches, terms: Sequence
         modes = [V[rows, :, channel] @ roots[TRIADS[channel // 3], length] for channel in range(len(CHANNELS))]
         U, size, _ = np.linalg.svd(np.hstack(modes), full_matrices=False)
         parts.append(_Part(rows, np.ascontiguousarray(U), 1.0 - 1.0 / np.sqrt(1.0 + size**2)))
-    return InnerNoise(tuple(parts))
+    return InnerNoise(tuple(parts), tuple(terms))
 
 
 def _cosine(k: int, cut: Stretches) -> Effect:

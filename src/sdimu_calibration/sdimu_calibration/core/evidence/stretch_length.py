@@ -25,6 +25,9 @@ from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 MOVES = 0.5
 """Ratio of the variance between the halves of a stretch to that of white noise, from which the stretch is halved: half
 as much changes a sigma by a fifth."""
+_OTHER = 2.0
+"""Ratio of the variance that moves within a stretch to that in which rows are whitened (1) from which that is done
+anew: the 95 % interval of a size is as wide."""
 
 
 def wander_of(evidence: LinearEvidence) -> Wander:
@@ -40,6 +43,13 @@ def wander_of(evidence: LinearEvidence) -> Wander:
         return wander
     terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
     return _halved(evidence, replace(wander, learned=terms), terms)
+
+
+def held(wander: Wander, terms: Sequence[NoiseTerm]) -> bool:
+    """Tell whether stretches, with the noise that they are whitened in, hold noise as it moves within them."""
+    moves = max(moves_within(wander, terms), MOVES)
+    known = 0.0 if wander.inner is None else moves_within(wander, wander.inner.terms)
+    return 1.0 / _OTHER < moves / max(known, MOVES) < _OTHER
 
 
 def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
