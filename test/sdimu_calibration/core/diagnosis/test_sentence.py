@@ -80,6 +80,22 @@ def test_an_equation_that_fits_is_not_called_certain_physics(summary):
     assert sentence(replace(d, own=False, verdict=Verdict.ONE_EFFECT), told.found).startswith("Certain: accelerometer")
 
 
+@pytest.mark.parametrize(("kind", "left"), [(STOP, "What is left looks like"), (ATTITUDE, "What is left is the accel")])
+def test_what_is_found_beside_what_is_unexplained_has_its_grade(summary, kind, left):
+    """A step of .61, beside hysteresis of .39, was "Found, but not all: gyro_bias_step_x"."""
+    told = with_shares(summary, 0.999, (own(summary), 0.61), ("accel_cubic_x", 0.39))
+    noise = NoiseTerm("accel", kind, size=2e-5, low=1e-5, high=3e-5)
+    d = replace(told.diagnosis, found=replace(told.diagnosis.found, noise=(noise,)), verdict=Verdict.UNEXPLAINED)
+    words = sentence(d, told.found)
+    assert words.startswith("Certain, but open which: accelerometer second-order nonlinearity K2, x (")
+    assert f") 61 % or {named('accel_cubic_x')} 39 %. {left}" in words
+    alone = with_shares(summary, 0.999, (own(summary), 0.999))
+    assert sentence(d, alone.found).startswith("Certain: accelerometer")
+    assert sentence(d, alone.found, held=False).startswith("In what was fitted, but not beyond it: accelerometer")
+    equation = sentence(replace(d, own=True), alone.found)
+    assert equation.startswith("Missing for certain, and fitted by: accelerometer")
+
+
 def test_what_fails_where_it_was_not_fitted_is_not_called_certain_nor_to_be_trusted(summary, monkeypatch):
     """In a recording metres without aid grew from 40 to 105 m beside "Certain: ..."."""
     told = with_shares(summary, 0.999, (own(summary), 0.999))

@@ -11,7 +11,15 @@ from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import ODDS, SHARE, NoiseModel, explored, instead_of, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import (
+    ODDS,
+    SENSORS,
+    SHARE,
+    NoiseModel,
+    explored,
+    instead_of,
+    usual_sizes,
+)
 from sdimu_calibration.storage.files.config import load_imu
 
 TRIED = tuple(NoiseTerm(triad, kind) for triad in TRIADS for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT))
@@ -152,6 +160,17 @@ def test_each_term_may_stand_for_an_effect_and_other_drawn_terms_in_its_place_ar
     without = [NoiseModel((accel,), (-2.0,)), NoiseModel((shift,), (-1.0,))]
     smaller = NoiseModel((replace(stop, size=1.0), accel), (-3.0, -2.0))
     assert instead_of(likeliest, others) == [*without, smaller]
+
+
+def test_of_drawn_kinds_in_the_place_of_others_each_choice_is_tried_once_and_what_wanders_keeps_its_size():
+    walk = NoiseTerm("gyro", RANDOM_WALK, size=2.0)
+    likeliest = NoiseModel((NoiseTerm("gyro", SHIFT, size=2.0),), (-1.0,))
+    attitude = [NoiseModel((NoiseTerm("gyro", "attitude", size=2.0, axes=axes),), (-1.0,)) for axes in SENSORS]
+    stop = NoiseModel((NoiseTerm("gyro", STOP, size=2.0), walk), (-1.0, -1.0))
+    white, first, second = instead_of(likeliest, [likeliest, *attitude, stop])
+    assert white == NoiseModel()
+    assert first.terms == (replace(attitude[0].terms[0], size=1.0),)
+    assert second.terms == (replace(stop.terms[0], size=1.0), walk)
 
 
 def shifted_once(rng, cut, size):

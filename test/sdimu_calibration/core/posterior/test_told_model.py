@@ -111,3 +111,17 @@ def test_what_models_hold_instead_is_of_the_class_though_it_fits_worse_in_the_no
 def test_an_effect_that_has_nothing_to_do_with_another_is_not_told_in_its_place():
     apart = ((QUADRATIC,), 0.3), ((QUADRATIC, OTHER), 0.3), ((OTHER,), 0.2), ((), 0.2)
     assert window(*apart).classes == ((),)
+
+
+def test_what_stands_for_two_effects_is_told_in_the_place_of_one():
+    found = window(((QUADRATIC, SHORT), 0.45), ((OTHER,), 0.4), ((QUADRATIC,), 0.15))
+    assert [number for number, _ in found.told.members] == [QUADRATIC, SHORT]
+    assert found.classes == ((OTHER,), (LONG, RAMP))
+    assert found.of_class(0) == pytest.approx(1.0)
+    assert told(found) == {KEYS[QUADRATIC]}
+
+
+def test_what_few_models_hold_in_the_place_of_a_class_is_not_told():
+    found = window(((QUADRATIC,), 0.9), ((OTHER,), 0.04), ((), 0.06))
+    assert found.classes == ((),)
+    assert window(((QUADRATIC,), 0.97), ((OTHER,), 0.03)).classes == ((),)

@@ -27,7 +27,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import held, wander_in
 from sdimu_calibration.core.evidence.wander import Wander
-from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
+from sdimu_calibration.core.noise_term import ATTITUDE, NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import NOT_TRUSTED
@@ -45,11 +45,7 @@ MOST_ROUNDS = 4
 """Number of rounds at most, where a round may choose any number of effects: a choice that does not stand by then goes
 to and fro between effects that look alike."""
 _MOST_WHITENED = 2
-"""Number of times at most that rows are whitened in noise that was found: in that of the first round, then of the
-last."""
-_DRAWN = 0.02
-"""Probability of noise of a triad (1) that is drawn anew or follows something, from which equations are looked for:
-those that are missed below it are one in fifty."""
+"""Number of times (1) at most that rows are whitened in noise that was found: of the first round, and at the end."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
@@ -76,26 +72,18 @@ class Round:
 
     @property
     def wants_equations(self) -> bool:
-        """Whether something is left, took suspiciously many terms or may be noise that is drawn, or nothing helped."""
+        """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
         many = len(self.found.chosen) >= _MANY
-        return self.left_after.p_value < UNEXPLAINED_P or many or refused or self._may_be_drawn
-
-    @property
-    def _may_be_drawn(self) -> bool:
-        """Whether noise is told that may be drawn anew, or follow something: what wanders alone is no equation."""
-        window = self.found.posterior
-        if window is None or not self.found.noise:
-            return False
-        return any(window.of_noise(triad, DRAWN) > _DRAWN for triad in TRIADS)
+        return self.left_after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
 
 
 def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
-    """Repeat rounds until the choice stands, then fit it in its noise.
+    """Search until the choice stands, then fit it in its noise.
 
-    Where the noise that was found moves within stretches, rows are whitened in it and the rounds go on. Only noise that
-    stands beside the effects says what moves within stretches: without them it takes in what they do. So that of the
-    first round, and that beside what stands, are looked at.
+    Where the noise that was found moves within stretches, rows are whitened in it and the search goes on. Only noise
+    that stands beside the effects says what moves within stretches: without them it takes in what they do. So that of
+    the first round, and that at the end, are looked at.
 
     Returns
     -------
@@ -104,52 +92,73 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
     done : Round
         The last one; its fit holds what it chose.
     """
-    ground = _first_ground(request, progress)
-    own, asked, stood, whitened = False, False, False, 0
-    limits: dict[bool, float] = {}
-    done: Round | None = None
-    left, part = MOST_ROUNDS, 0.4
-    while left:
-        left, beside = left - 1, False
-        progress("candidates", part := min(0.8, part + 0.1))
-        done = run_round(request, ground, own, limits, done)
-        stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
-        first = left == MOST_ROUNDS - 1 and not whitened
-        asks = (first or stood) and not own and whitened < _MOST_WHITENED
-        within = _whitened(request, done) if asks else None
-        if within is not None:
-            request, whitened, left, limits = within, whitened + 1, MOST_ROUNDS, {}
-            ground = fresh_ground(request, ground.fit, ground.tried, own)
-            continue
+    first = ground = _first_ground(request, progress)
+    progress("candidates", 0.4)
+    done = run_round(request, ground, False, {}, None)
+    within = _whitened(request, done)
+    for left in reversed(range(_MOST_WHITENED + 1)):
+        if within is None:
+            request, done = search_until_stable(request, ground, done, progress)
+            within = _whitened(request, done) if left else None
+            if within is None:
+                break
+        request, ground, within = within, fresh_ground(within, first.fit, first.tried, False), None
+        done = run_round(request, ground, False, {}, done)
+    # Before the fit: its noise has the intervals that are stated here.
+    done = replace(done, found=replace(with_steps(done.found), stood=done.found.stood))
+    fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
+    return request, replace(done, fit=fit)
+
+
+def _whitened(request: Request, done: Round) -> Request | None:
+    """Return the request in stretches that hold the noise of a round; None where its own do."""
+    if request.wander is None or held(request.wander, done.found.noise):
+        return None
+    wander = wander_in(request.base.bare, done.found.noise)
+    same = wander.inner is request.wander.inner and len(wander.cut.start) == len(request.wander.cut.start)
+    return None if same else replace(request, wander=wander)
+
+
+def search_until_stable(request: Request, ground: Ground, done: Round, progress: Progress) -> tuple[Request, Round]:
+    """Repeat rounds until the choice stands.
+
+    Parameters
+    ----------
+    ground : Ground
+        Of the first round.
+    done : Round
+        The first round.
+
+    Returns
+    -------
+    request : Request
+        With functions of the attitude in its wander, where the last round had them.
+    done : Round
+        The last one.
+    """
+    own, asked, stood = False, False, False
+    limits = {False: done.found.threshold}
+    for turn in range(MOST_ROUNDS):
+        beside = False
+        if turn:
+            progress("candidates", min(0.8, 0.4 + 0.1 * turn))
+            done = run_round(request, ground, own, limits, done)
         if done.wants_equations and not own and not asked:
             asked = True
-            progress("equations", part)
+            progress("equations", min(0.8, 0.45 + 0.1 * turn))
             exact = with_attitude_functions(request, done.found)
             wider = next_ground(exact, ground, ground.fit, ground.tried, True, done.found)
             wide = run_round(exact, wider, True, limits, done)
             if any(c.family == "own" for c in wide.chosen) or ATTITUDE in {t.kind for t in wide.found.noise}:
                 # Equations that come near beside a function of the attitude alone were not looked at yet.
-                beside = exact is not request and left > 0
+                beside = exact is not request and turn + 1 < MOST_ROUNDS
                 request, done, own, ground = exact, wide, True, wider
         stood = {c.label for c in done.chosen} == {c.label for c in ground.tried}
         if stood and not beside:
             break
         trial = ground.fit if stood else extended(request, done.chosen, progress)
         ground = next_ground(request, ground, trial, done.chosen, own, done.found)
-    if done is None:
-        raise AssertionError("a search has one round at least")
-    # Before the fit: its noise has the intervals that are stated here.
-    done = replace(done, found=replace(with_steps(done.found), stood=stood))
-    fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
-    return request, replace(done, fit=fit)
-
-
-def _whitened(request: Request, done: Round) -> Request | None:
-    """Return the request in what moves within stretches of the noise of a round; None where that is known."""
-    if request.wander is None or held(request.wander, done.found.noise):
-        return None
-    wander = wander_in(request.base.bare, done.found.noise)
-    return None if wander.inner is request.wander.inner else replace(request, wander=wander)
+    return request, replace(done, found=replace(done.found, stood=stood))
 
 
 def _first_ground(request: Request, progress: Progress) -> Ground:

@@ -65,7 +65,7 @@ class Search(Generic[E]):
         return tuple(self.evidence.candidate(column) for column in self.chosen.tolist())
 
     def columns_alike(self, place: int) -> list[int]:
-        """Columns of what the data cannot tell from one of `chosen`, by its place there; the likeliest first."""
+        """Columns of what may be in the place of one of `chosen`, by its place there; the likeliest first."""
         if self.posterior is None or place >= len(self.chosen):
             return []
         return self.posterior.alike(int(self.chosen[place]))

@@ -99,15 +99,15 @@ def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
     if d.verdict == Verdict.DATA_FAULT:
         grave = [f.text for f in d.findings if f.grave]
         return f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found)
-    if d.verdict == Verdict.UNEXPLAINED:
-        return _unexplained(d, found, held)
-    if not d.chosen and d.probabilities is not None:
-        return something_missing(d.probabilities)
     every = _graded(d, [one for one in found if not _is_fault(one)])
     firm = (_EQUATION if d.own else "Certain") if held else _FITTED
+    told = f"{in_grades(every, firm)} {_of_recording(d, found)}".strip()
+    if d.verdict == Verdict.UNEXPLAINED:
+        return _unexplained(d, told)
+    if not d.chosen and d.probabilities is not None:
+        return something_missing(d.probabilities)
     # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    own = f"No effect of the catalogue fits, an equation does. {in_grades(every, firm)}"
-    return f"{own if d.own else in_grades(every, firm)} {_of_recording(d, found)}".strip()
+    return f"No effect of the catalogue fits, an equation does. {told}" if d.own else told
 
 
 def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:
@@ -156,13 +156,12 @@ def _consistent(d: Diagnosis) -> str:
     return f"{clean}; but {odd}." if odd else f"{clean}."
 
 
-def _unexplained(d: Diagnosis, found: Sequence[Found], held: bool) -> str:
+def _unexplained(d: Diagnosis, told: str) -> str:
     if d.rungs and d.rungs[-1].scatter is not None:
         most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
         return f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}."
     names = listed(c.label for c in d.chosen)
-    told = in_grades(_graded(d, found), "Certain" if held else _FITTED) if names else ""
     follows = [term_in_words(term) for term in d.found.noise if term.kind in FOLLOWS]
     drawn = [term_in_words(term) for term in d.found.noise if term.kind not in FOLLOWS]
     if follows:

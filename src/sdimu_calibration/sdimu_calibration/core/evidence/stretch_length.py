@@ -46,10 +46,12 @@ def wander_of(evidence: LinearEvidence) -> Wander:
 
 
 def held(wander: Wander, terms: Sequence[NoiseTerm]) -> bool:
-    """Tell whether stretches, with the noise that they are whitened in, hold noise as it moves within them."""
-    moves = max(moves_within(wander, terms), MOVES)
+    """Tell whether stretches, with the noise that rows are whitened in, hold noise as it moves within them."""
+    moves = moves_within(wander, terms)
     known = 0.0 if wander.inner is None else moves_within(wander, wander.inner.terms)
-    return 1.0 / _OTHER < moves / max(known, MOVES) < _OTHER
+    if moves < MOVES or known < MOVES:
+        return moves < MOVES and known < MOVES
+    return 1.0 / _OTHER < moves / known < _OTHER
 
 
 def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:

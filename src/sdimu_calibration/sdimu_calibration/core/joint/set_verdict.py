@@ -147,7 +147,7 @@ def _found(word: Verdict, facts: SetFacts) -> str:
             return _many_changed(changed)
         if word == Verdict.DATA_FAULT:
             return f"All recordings agree but for {names}."
-        most = f" {in_grades(list(map(_graded, findings)))}" if findings else ""
+        most = f" Found beside it: {in_grades(list(map(_graded, findings)))}" if findings else ""
         odd = "" if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
         what = "The recordings share something" if shared else "Something differs between the recordings"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -36,8 +36,8 @@ def climbed(
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
     Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
-    looked for beside the best effects and those of the start alone, and only the kinds that were `tried`; all kinds
-    without any.
+    looked for beside the best effects, these without drifts, and those of the start, and only the kinds that were
+    `tried`; all kinds without any.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def climbed(
     rivals: list[Members] = []
     # Beside which effects only the kinds that were known then were looked for.
     partly: set[Members] = set()
-    for _ in range(_ROUNDS):
+    for turn in range(_ROUNDS):
         beside = [members, without_drifts(board, members), *(starts if settled else [()])]
         wanted = [
             one for one in dict.fromkeys([*beside, *rivals]) if one not in asked or (one == members and one in partly)
@@ -97,10 +97,9 @@ def climbed(
         if start and data.at(start).score > score - _TIE:
             members = start
         best = max(best, offset + score)
-        # A size that was found beside other effects took up what these explain: beside them the noise may be likelier.
-        others = [(score, one) for score, _, one in known] + _in_place(board, ranked)
-        others = sorted((one for one in others if one[0] > known[0][0] - WINDOW), key=lambda one: -one[0])
-        rivals = [one for one in dict.fromkeys(one for _, one in others) if one not in asked and one != members][:1]
+        in_place = _in_place(board, ranked) if turn + 1 < _ROUNDS else []
+        weighed = [(score, one) for score, _, one in known] + in_place
+        rivals = _rivals(weighed, known[0][0] - WINDOW, {members, *asked})
     if members not in asked or members in partly:
         asked[members] = board.noises(members, tried, best)
     kept = [(noise, one) for score, noise, one in known if score > known[0][0] - WINDOW]
@@ -147,6 +146,15 @@ def in_same_noise(
     found.sort(reverse=True)
     order = [-place for _, place, _ in found]
     return [*(noises[k] for k in order), *noises[_FEW:]], found[0][2]
+
+
+def _rivals(found: Sequence[tuple[float, Members]], least: float, known: Collection[Members]) -> list[Members]:
+    """Choose effects beside which noise is looked for though others are ahead: the likeliest, from a log posterior on.
+
+    A size that was found beside other effects took up what these explain: beside them the noise may be likelier.
+    """
+    near = sorted((one for one in found if one[0] > least), key=lambda one: -one[0])
+    return [members for _, members in near if members not in known][:1]
 
 
 def _in_place(board: Board[E], ranked: Sequence[tuple[float, NoiseModel, Members]]) -> list[tuple[float, Members]]:

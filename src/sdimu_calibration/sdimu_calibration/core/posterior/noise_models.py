@@ -85,8 +85,8 @@ _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
 _SMALLER = 0.5
 """Size of noise beside an effect over that found beside none (1): the effect made most of it."""
-_MOST_DRAWN = 6
-"""Number of noises with other drawn terms that are looked at (1): of each triad three, one of each cause."""
+_MOST_DRAWN = 3
+"""Number of noises (1) with other drawn kinds in a triad that are looked at: behind them follow those of two kinds."""
 SENSORS = tuple(axes for count in (3, 1, 2) for axes in combinations(AXES, count))
 """Sensors of a triad that an unknown function may be of, likely alike: nobody knows what causes it."""
 
@@ -125,9 +125,9 @@ class NoiseModel:
         """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
         return not any(t.kind in DRAWN for t in self.terms)
 
-    def drawn_in(self, triad: str) -> frozenset[Identity]:
-        """Say what the terms of a triad are that hang on attitude, rate or turns."""
-        return frozenset(t.identity for t in self.terms if t.triad == triad and t.kind in DRAWN)
+    def drawn_in(self, triad: str) -> frozenset[str]:
+        """Name the kinds of the terms of a triad that hang on attitude, rate or turns."""
+        return frozenset(t.kind for t in self.terms if t.triad == triad and t.kind in DRAWN)
 
 
 @dataclass(frozen=True)
@@ -326,15 +326,19 @@ class _Search:
 
 def _otherwise_drawn(ranked: Sequence[_Found]) -> list[_Found]:
     """Noises with other drawn terms in the place of the likeliest's: with an effect beside it one may be likelier."""
-    best, out = ranked[0].noise, []
-    for triad in TRIADS:
-        known = {frozenset(), best.drawn_in(triad)}
-        for found in ranked if best.drawn_in(triad) else ():
-            own = found.noise.drawn_in(triad)
-            if own not in known and found.score > ranked[0].score - _BEHIND:
-                known.add(own)
-                out.append(found)
-    return out[:_MOST_DRAWN]
+    far = [found for found in ranked if ranked[0].score - _BEHIND < found.score <= ranked[0].score - _NEAR]
+    behind = {found.noise: found for found in far}
+    near = [found.noise for found in ranked if found.score > ranked[0].score - _NEAR]
+    out = [noise for triad in TRIADS for noise in _first_of_each(ranked[0].noise, [*near, *behind], triad)]
+    return [behind[noise] for noise in dict.fromkeys(out) if noise in behind]
+
+
+def _first_of_each(likeliest: NoiseModel, others: Sequence[NoiseModel], triad: str) -> list[NoiseModel]:
+    """First noise of each choice of drawn kinds in a triad that is not that of the likeliest noise."""
+    own, first = likeliest.drawn_in(triad), dict[frozenset[str], NoiseModel]()
+    for noise in others if own else ():
+        first.setdefault(noise.drawn_in(triad), noise)
+    return [noise for drawn, noise in first.items() if drawn not in {own, frozenset()}][:_MOST_DRAWN]
 
 
 def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
@@ -354,10 +358,7 @@ def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[Nois
     """
     out = [_without(likeliest, place) for place in range(len(likeliest.terms))]
     for triad in TRIADS:
-        own, first = likeliest.drawn_in(triad), dict[frozenset[Identity], NoiseModel]()
-        for noise in others if own else ():
-            first.setdefault(noise.drawn_in(triad), noise)
-        out += [_smaller(noise, triad) for drawn, noise in first.items() if drawn not in {own, frozenset()}]
+        out += [_smaller(noise, triad) for noise in _first_of_each(likeliest, others, triad)]
     return out
 
 
@@ -367,9 +368,9 @@ def _without(noise: NoiseModel, place: int) -> NoiseModel:
 
 
 def _smaller(noise: NoiseModel, triad: str) -> NoiseModel:
-    return replace(
-        noise, terms=tuple(replace(t, size=_SMALLER * t.size) if t.triad == triad else t for t in noise.terms)
-    )
+    drawn = [t.triad == triad and t.kind in DRAWN for t in noise.terms]
+    sized = [replace(t, size=_SMALLER * t.size) if one else t for t, one in zip(noise.terms, drawn, strict=True)]
+    return replace(noise, terms=tuple(sized))
 
 
 def _is_in(term: NoiseTerm, terms: Sequence[NoiseTerm]) -> bool:
@@ -441,7 +442,7 @@ def explored(
     search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
     near = [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
-    near += [(found.score, found.noise) for found in _otherwise_drawn(ranked) if found.score <= ranked[0].score - _NEAR]
+    near += [(found.score, found.noise) for found in _otherwise_drawn(ranked)]
     if any(noise.wanders_alone for _, noise in near):
         return near
     wandering = [term for term in search.tried if term.kind not in DRAWN]

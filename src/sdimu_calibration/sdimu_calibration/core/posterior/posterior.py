@@ -180,26 +180,35 @@ class Posterior(Generic[E]):
 
     @cached_property
     def classes(self) -> tuple[tuple[int, ...], ...]:
-        """What the data cannot tell from each member of the told model, and what else stands in its place.
+        """What may be in the place of each member of the told model.
 
         Candidates; those that fit as well come first, then others of its family, then those that models hold where none
         of these is. The likeliest come before the others.
         """
         alike = [(*own, *self._in_place_of(own)) for own in self._classes_of(self.told)]
-        return tuple((*own[1:], *self._instead_of(own)) for own in alike)
+        others = [self._instead_of(own) for own in alike]
+        # One that stands for two effects stands for one of them: models that hold it have one effect fewer.
+        most = {k: max(range(len(others)), key=lambda j: others[j].get(k, 0.0)) for k in set().union(*others)}
+        return tuple(
+            (*own[1:], *(k for k in sorted(other, key=lambda k: -other[k]) if most[k] == place))
+            for place, (own, other) in enumerate(zip(alike, others, strict=True))
+        )
 
-    def _instead_of(self, alike: tuple[int, ...]) -> list[int]:
-        """Candidates that models hold where they hold none of a class, and hardly ever beside it."""
+    def _instead_of(self, alike: tuple[int, ...]) -> dict[int, float]:
+        """Candidates that models hold where they hold none of a class, with their probability there.
+
+        Beside the class models hold them hardly ever.
+        """
         has = self._holds[:, list(alike)].any(axis=1)
         with_it, without = self._weights * has, self._weights * ~has
         if without.sum() < _INSTEAD:
-            return []
+            return {}
         told = {number for number, _ in self.told.members}
         share = {k: float(without @ self._holds[:, k]) for k in self.held if k not in told}
         # Its probability beside the class is at most a share of that where the class is not.
         most = _SELDOM * with_it.sum() / without.sum()
-        out = [k for k, p in share.items() if p >= _INSTEAD and float(with_it @ self._holds[:, k]) <= most * p]
-        return sorted(out, key=lambda k: -share[k])
+        instead = {k: p for k, p in share.items() if p >= _INSTEAD and float(with_it @ self._holds[:, k]) <= most * p}
+        return {k: p / float(without.sum()) for k, p in instead.items()}
 
     def _in_place_of(self, alike: tuple[int, ...]) -> list[int]:
         """Members of the family of a class's first candidate that models hold instead of it, rather than beside it."""
@@ -247,7 +256,7 @@ class Posterior(Generic[E]):
         return self.board.columns(self.told.members).index(column)
 
     def alike(self, column: int) -> list[int]:
-        """Columns of what the data cannot tell from a member of the told model, the likeliest first."""
+        """Columns of what may be in the place of a member of the told model, the likeliest first."""
         return [int(self.board.use[number]) for number in self.classes[self.place_of(column)]]
 
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
@@ -298,7 +307,7 @@ def posterior(
     # Functions of the attitude stand in the place of many effects: no search from these leads there.
     wide = before is None or (_has_functions(wander) and not _has_functions(before.board.wander))
     tried = before.tried if before is not None and not wide else None
-    if tried and before is not None and wander is not None and wander is not before.board.wander:
+    if tried is not None and before is not None and wander is not None and wander is not before.board.wander:
         # In other stretches a kind that was far behind may not be.
         tried = every_kind(wander.cut)
     settled = not wide and len(starts) > 0
