@@ -26,13 +26,15 @@ def predicted(fitted, rows):
     return error, -0.5 * (error @ np.linalg.solve(S, error) + np.linalg.slogdet(S)[1]), np.diag(S)
 
 
-@pytest.mark.parametrize("number", [1, 8, 24, 30])
+@pytest.mark.parametrize("number", [1, 8, 24, 25, 30, 34])
 def test_rows_left_out_are_predicted_from_the_others(fitted, number):
     W, e, weight, shift = fitted
     rows = np.arange(10, 10 + number)
-    told = _Normal(W, e, weight, shift).without(np.isin(np.arange(len(e)), rows))
-    for mine, true in zip(told, predicted(fitted, rows), strict=True):
-        assert mine == pytest.approx(true, rel=1e-6)
+    normal, left_out = _Normal(W, e, weight, shift), np.isin(np.arange(len(e)), rows)
+    every = [normal.without(left_out), normal._by_parameters(left_out), normal._anew(W[rows], e[rows])]
+    for told in every:
+        for mine, true in zip(told, predicted(fitted, rows), strict=True):
+            assert mine == pytest.approx(true, rel=1e-6)
 
 
 def test_a_row_that_alone_tells_of_a_parameter_is_predicted_as_badly_as_its_prior_says(fitted):
@@ -41,7 +43,10 @@ def test_a_row_that_alone_tells_of_a_parameter_is_predicted_as_badly_as_its_prio
     alone[:60, :25], alone[60, 25] = W, 1e5
     weight, shift = np.append(weight, 1.0), np.append(shift, 0.0)
     e = np.append(e, 3.0)
-    error, score, spread = _Normal(alone, e, weight, shift).without(np.arange(61) == 60)
+    normal, left_out = _Normal(alone, e, weight, shift), np.arange(61) == 60
+    assert normal._by_rows(left_out) is None
+    assert normal._by_parameters(left_out) is None
+    error, score, spread = normal.without(left_out)
     assert error == pytest.approx([3.0])
     assert spread == pytest.approx([1.0 + 1e10])
     assert score == pytest.approx(-0.5 * np.log(1e10), rel=1e-6)

@@ -107,8 +107,9 @@ class _Normal:
         spread : ndarray, shape (n,)
             Variance of each error.
         """
-        told = self._by_rows(rows) if np.count_nonzero(rows) < len(self.weight) else None
-        return self._by_parameters(self.W[rows], self.e[rows]) if told is None else told
+        few = np.count_nonzero(rows) < len(self.weight)
+        told = self._by_rows(rows) if few else self._by_parameters(rows)
+        return self._anew(self.W[rows], self.e[rows]) if told is None else told
 
     def _by_rows(self, rows: Bools) -> tuple[Floats, float, Floats] | None:
         """Work in the number of rows, from the fit to all of them; None where hardly anything else tells of a row.
@@ -130,7 +131,25 @@ class _Normal:
         log_score = -0.5 * float(white @ white) + float(np.log(np.diag(L)).sum())
         return white @ root, log_score, spread
 
-    def _by_parameters(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
+    def _by_parameters(self, rows: Bools) -> tuple[Floats, float, Floats] | None:
+        """Work in the number of parameters k, from the fit to all rows; None as of `_by_rows`.
+
+        ``(I - X X')^-1 = I + X (I - X'X)^-1 X'`` with the same determinant: ``I - X'X`` has the size k.
+        """
+        X, error = self.of_fit[0][rows], self.of_fit[1][rows]
+        left = np.eye(X.shape[1]) - X.T @ X
+        L, failed = lapack.dpotrf(left, lower=1)
+        if failed:
+            return None
+        Y = solve_triangular(L, X.T, lower=True, check_finite=False)
+        spread = 1.0 + np.einsum("ij,ij->j", Y, Y)
+        if _LEAST_LEFT * spread.sum() > 1.0 and np.linalg.eigvalsh(left)[0] < _LEAST_LEFT:
+            return None
+        white = Y @ error
+        log_score = -0.5 * float(error @ error + white @ white) + float(np.log(np.diag(L)).sum())
+        return error + white @ Y, log_score, spread
+
+    def _anew(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
         """Work in the number of parameters, from the fit to the other rows.
 
         The log of N(error; 0, I + W A^-1 W') by the matrix inversion lemma.
