@@ -20,7 +20,6 @@ class Found:
     noise: tuple[NoiseTerm, ...] = ()
     stood: bool = True
     threshold: float = 1.0
-    posterior: object = None
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
+from sdimu_calibration.core.joint.set_verdict import sentence as sentence_of_set
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities, Share
@@ -345,3 +346,13 @@ def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
     assert term_in_words(unknown) in left
     assert "flicker" not in left
     assert account.startswith("it and gyro bias instability (flicker)")
+
+
+def test_what_a_set_finds_beside_what_is_unexplained_has_its_grade(summary):
+    label = "gyro_bias_warm_up_x(tau=600 s)"
+    of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.7, (Share("gyro_bias_warm_up_x", 0.7),))
+    after = replace(summary.diagnosis.after, of_set=None, warnings=())
+    facts = SetFacts([of_set], after, SimpleNamespace(function=None, reports=()), None, None)
+    words = sentence_of_set(Verdict.UNEXPLAINED, facts)
+    assert words.startswith("Something differs between the recordings that no effect of the catalogue explains. ")
+    assert "Found beside it: Likely (70 %): gyro warm-up" in words

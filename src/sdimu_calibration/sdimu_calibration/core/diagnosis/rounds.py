@@ -105,7 +105,7 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
         request, ground, within = within, fresh_ground(within, first.fit, first.tried, False), None
         done = run_round(request, ground, False, {}, done)
     # Before the fit: its noise has the intervals that are stated here.
-    done = replace(done, found=replace(with_steps(done.found), stood=done.found.stood))
+    done = replace(done, found=with_steps(done.found))
     fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
     return request, replace(done, fit=fit)
 
@@ -115,7 +115,7 @@ def _whitened(request: Request, done: Round) -> Request | None:
     if request.wander is None or held(request.wander, done.found.noise):
         return None
     wander = wander_in(request.base.bare, done.found.noise)
-    same = wander.inner is request.wander.inner and len(wander.cut.start) == len(request.wander.cut.start)
+    same = wander.inner is request.wander.inner and len(wander.cut) == len(request.wander.cut)
     return None if same else replace(request, wander=wander)
 
 

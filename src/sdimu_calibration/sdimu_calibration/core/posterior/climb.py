@@ -26,8 +26,9 @@ kind of noise that is known beside no others adds less."""
 _NOISES = 6
 """Number of noises in which effects are looked for, the likeliest first: each takes a climb."""
 _FEW = 2
-"""Number of noises in which effects are looked for again when a time constant was sharpened, and of effects that one
-term of noise may stand for: the likeliest."""
+"""Number of noises in which effects are looked for again when a time constant was sharpened: the likeliest."""
+_IN_PLACE = 2
+"""Number of effects (1) that one term of noise may stand for: beside two the noise is looked for anew."""
 
 
 def climbed(
@@ -169,7 +170,7 @@ def _in_place(board: Board[E], ranked: Sequence[tuple[float, NoiseModel, Members
     out = []
     for noise in board.instead_of(likeliest, [noise for _, noise, _ in ranked]):
         offset, data = board.data(noise)
-        gain, found = best_from(data, members, of_two=False, most=len(members) + _FEW)
+        gain, found = best_from(data, members, of_two=False, most=len(members) + _IN_PLACE)
         out.append((offset + gain, found))
     return out
 
