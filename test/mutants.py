@@ -46,8 +46,8 @@ MUTANTS = (
     ),
     Mutant(
         "evidence/held_out.py",
-        "        A = self.J - W.T @ W + np.diag(self.weight)\n",
-        "        A = self.J + np.diag(self.weight)\n",
+        "        A = self.columns.square - W.T @ W + np.diag(self.weight)\n",
+        "        A = self.columns.square + np.diag(self.weight)\n",
         (f"{TESTS}/evidence", f"{TESTS}/diagnosis"),
     ),
     Mutant(

@@ -1,4 +1,4 @@
-"""Stops predicted from the others: in the number of rows or of parameters, the same prediction."""
+"""Stops predicted from the others: from the fit to all rows and from that to the others, the same prediction."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.held_out import _Normal
+from sdimu_calibration.core.evidence.in_stops import InStops
 
 
 @pytest.fixture(scope="module")
@@ -26,13 +27,21 @@ def predicted(fitted, rows):
     return error, -0.5 * (error @ np.linalg.solve(S, error) + np.linalg.slogdet(S)[1]), np.diag(S)
 
 
+def normal_of(W, e, weight, shift, rows):
+    """Normal equations of a test with two stops, the second one of these rows."""
+    stop = np.isin(np.arange(len(e)), rows).astype(np.int64)
+    # Half of the columns stand beside those that are known, as a model stands beside noise.
+    columns = InStops.of(W[:, :12], stop).beside(W[:, 12:])
+    return _Normal.of(columns, e, weight, shift)
+
+
 @pytest.mark.parametrize("number", [1, 8, 24, 25, 30, 34])
-def test_rows_left_out_are_predicted_from_the_others(fitted, number):
-    W, e, weight, shift = fitted
+def test_rows_left_out_are_predicted_from_the_others(fitted, number, monkeypatch):
     rows = np.arange(10, 10 + number)
-    normal, left_out = _Normal(W, e, weight, shift), np.isin(np.arange(len(e)), rows)
-    every = [normal.without(left_out), normal._by_parameters(left_out), normal._anew(W[rows], e[rows])]
-    for told in every:
+    of_all = normal_of(*fitted, rows).without(1)
+    monkeypatch.setattr(_Normal, "_of_fit_to_all", lambda *_: None)
+    anew = normal_of(*fitted, rows).without(1)
+    for told in (of_all, anew):
         for mine, true in zip(told, predicted(fitted, rows), strict=True):
             assert mine == pytest.approx(true, rel=1e-6)
 
@@ -43,10 +52,18 @@ def test_a_row_that_alone_tells_of_a_parameter_is_predicted_as_badly_as_its_prio
     alone[:60, :25], alone[60, 25] = W, 1e5
     weight, shift = np.append(weight, 1.0), np.append(shift, 0.0)
     e = np.append(e, 3.0)
-    normal, left_out = _Normal(alone, e, weight, shift), np.arange(61) == 60
-    assert normal._by_rows(left_out) is None
-    assert normal._by_parameters(left_out) is None
-    error, score, spread = normal.without(left_out)
+    normal = normal_of(alone, e, weight, shift, [60])
+    assert normal._of_fit_to_all(1) is None
+    error, score, spread = normal.without(1)
     assert error == pytest.approx([3.0])
     assert spread == pytest.approx([1.0 + 1e10])
     assert score == pytest.approx(-0.5 * np.log(1e10), rel=1e-6)
+
+
+def test_a_stop_that_tells_of_nothing_is_predicted_as_white_noise(fitted):
+    W, e, weight, shift = fitted
+    W = np.vstack([W, np.zeros((2, 25))])
+    error, score, spread = normal_of(W, np.append(e, [2.0, -1.0]), weight, shift, [60, 61]).without(1)
+    np.testing.assert_allclose(error, [2.0, -1.0])
+    np.testing.assert_allclose(spread, 1.0)
+    assert score == pytest.approx(-2.5)

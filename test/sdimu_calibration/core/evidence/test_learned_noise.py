@@ -10,6 +10,7 @@ import pytest
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence import learned_noise
 from sdimu_calibration.core.evidence.conditions import Conditions
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, learn, likelihood
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
@@ -183,7 +184,7 @@ def test_the_mean_of_the_noise_counts_the_modes_that_no_measurement_sees(cut):
     U = np.eye(6 * len(cut))
     U[:, np.repeat(np.arange(len(cut)) % 4 > 0, 6)] = 0.0
     terms = (NoiseTerm("gyro", "flicker", 0.0, 2.0), NoiseTerm("accel", "random_walk", 0.0, 0.3))
-    modes = Wander(cut, U).modes(terms)
+    modes = Wander(cut, InStops.of(U, np.zeros(len(U), dtype=np.int64))).modes(terms)
     share = np.where(cut.turning, 0.0, cut.end - cut.start)
     share /= share.sum()
     total = modes.mean @ modes.mean.T + modes.unseen

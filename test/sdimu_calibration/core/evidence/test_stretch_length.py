@@ -26,6 +26,7 @@ class Ideal:
 
     def __init__(self, e: np.ndarray | None = None) -> None:
         self.e = np.zeros(7200) if e is None else e
+        self.stop = np.repeat(np.arange(10), 720)
         self.times = Timetable(1200.0, tuple((k, 120.0 * k, 120.0 * k + 120.0) for k in range(10)), ())
 
     def conditions(self, _cut):

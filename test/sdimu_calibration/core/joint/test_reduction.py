@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint import reduction as room
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
@@ -39,7 +40,7 @@ def test_noise_with_a_memory_is_whitened_by_its_covariance(seed):
     rng = np.random.default_rng(seed)
     modes, W = rng.normal(size=(40, 3)) * 2.0, rng.normal(size=(40, 4))
     S = np.eye(40) + modes @ modes.T
-    white = unit_noise(modes, W)
+    white = unit_noise(InStops.of(modes, np.arange(40) // 10), W)
     np.testing.assert_allclose(white.T @ white, W.T @ np.linalg.solve(S, W), atol=1e-10)
 
 

@@ -22,7 +22,7 @@ def found(bench):
     scale = [3e-9, 5e-7]
     root = root_of([NoiseTerm(triad, RANDOM_WALK, size=s) for triad, s in zip(TRIADS, scale, strict=True)], wander.cut)
     error = root @ rng.standard_normal((2, root.shape[1] // 6, 3)).transpose(0, 2, 1).ravel()
-    e = rng.standard_normal(len(evidence.e)) + wander.U @ error
+    e = rng.standard_normal(len(evidence.e)) + wander.U.times(error)
     known = replace(evidence.information, d=evidence.W.T @ e)
     seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
     return search(seen, ground.allowed, wander).posterior

@@ -31,7 +31,7 @@ def with_function(bench, kind, axes, size, seed=1):
     root = wander.cut.mode(kind, 0.0)
     error = np.zeros((len(wander.cut), 6))
     error[:, axes] = size * root @ rng.standard_normal((root.shape[1], len(range(*axes.indices(6)))))
-    e = rng.standard_normal(len(evidence.e)) + wander.U @ error.ravel()
+    e = rng.standard_normal(len(evidence.e)) + wander.U.times(error.ravel())
     known = replace(evidence.information, d=evidence.W.T @ e)
     seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
     return search(seen, ground.allowed, wander), error[:, axes], wander.cut

@@ -67,8 +67,8 @@ def bootstrap(d: Diagnosis, draws: int, seed: int = 1, progress: Progress | None
         if progress:
             progress("bootstrap", k / draws)
         e = rng.standard_normal(len(evidence.e))
-        if evidence.noise.size:
-            e = e + evidence.noise @ rng.standard_normal(evidence.noise.shape[1])
+        if evidence.noise is not None:
+            e = e + evidence.noise.times(rng.standard_normal((evidence.noise.parts.shape[1],)))
         known = Information(J, evidence.W.T @ evidence.weighed(e[:, None])[:, 0])
         part = replace(evidence, e=e, shift=np.zeros(len(evidence.weight)), worked_out=known)
         found = search(part, columns, limit=d.found.threshold)

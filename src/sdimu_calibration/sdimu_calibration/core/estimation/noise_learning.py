@@ -117,10 +117,11 @@ def _with_mean(evidence: LinearEvidence, modes: Modes, sensors: ImuModel) -> tup
     A constant part of wandering noise cannot be told from the bias, so the bias by itself means nothing in it; what
     the bias was in the mean over the test is known well.
     """
-    q, r = len(evidence.weight), modes.columns.shape[1]
-    W = np.hstack([evidence.W, modes.columns])
+    q, r = len(evidence.weight), modes.columns.parts.shape[1]
+    W, e, across = evidence.W, evidence.e, modes.columns.across(evidence.W)
     weight, fixed = np.append(evidence.weight, np.ones(r)), sensors.fixed
-    J, d = W.T @ W, W.T @ evidence.e
+    J = np.block([[W.T @ W, across], [across.T, modes.columns.square]])
+    d = np.append(W.T @ e, modes.columns.across(e[:, None])[0])
     # The prior as it is, correlations and all: its diagonal comes with the weights.
     J[:q, :q] += sensors.prior_information - np.diag(evidence.weight)
     d[:q] += sensors.prior_information @ evidence.shift

@@ -45,9 +45,9 @@ def doubt_in_stretch(
         SI.
     """
     q = len(evidence.weight)
-    W = evidence.W[rows, :q]
+    W = np.where(rows[:, None], evidence.W[:, :q], 0.0)
     R = root_of(terms, wander.cut)
-    bent = solved(W.T @ W + np.diag(evidence.weight), (W.T @ wander.U[rows]) @ R)
+    bent = solved(W.T @ W + np.diag(evidence.weight), wander.U.across(W) @ R)
     apart = _biases(evidence.names[:q], wander.cut, at) @ R - bent
     return np.asarray(apart @ apart.T)
 

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Bools, Floats, Ints
+from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.lean import lean
 
@@ -19,8 +20,8 @@ with lean():
     from scipy.linalg import lapack, solve_triangular
 
 _LEAST_LEFT = 1e-6
-"""Share (1) of a row that its own fit must leave for the prediction without it to be worked out of that fit: below, a
-difference of nearly equal numbers has less than nine digits."""
+"""Share (1) of a direction that its own fit must leave for the prediction without it to be worked out of that fit: a
+smaller difference of nearly equal numbers has less than nine digits."""
 
 
 @dataclass(frozen=True)
@@ -45,60 +46,59 @@ def predict(evidence: LinearEvidence, chosen: Ints, weight: Floats, shift: Float
     weight, shift : ndarray, shape (k,)
         Prior information and prior mean of each, about the calibration's values.
     """
-    W, e = evidence.W[:, chosen], evidence.e
-    if evidence.noise.size:
-        # Noise with a memory is predicted like a parameter of unit variance: what a stop shares with its neighbours.
-        W, r = np.hstack([W, evidence.noise]), evidence.noise.shape[1]
-        weight, shift = np.append(weight, np.ones(r)), np.append(shift, np.zeros(r))
-    normal = _Normal(W, e, weight, shift)
-    stops = np.unique(evidence.stop)
-    score = np.zeros(len(stops))
+    # Noise with a memory is predicted like a parameter of unit variance: what a stop shares with its neighbours.
+    noise = InStops.none(evidence.stop) if evidence.noise is None else evidence.noise
+    r = noise.parts.shape[1]
+    columns = noise.beside(evidence.W[:, chosen])
+    normal = _Normal.of(columns, evidence.e, np.append(np.ones(r), weight), np.append(np.zeros(r), shift))
+    score = np.zeros(len(columns.stops))
     total, count = 0.0, 0
-    for k, stop in enumerate(stops):
-        rows = evidence.stop == stop
-        error, score[k], spread = normal.without(rows)
+    for k in range(len(score)):
+        error, score[k], spread = normal.without(k)
         told = spread < evidence.unpredictable
         total += float(np.sum(error[told] ** 2 / spread[told]))
         count += int(told.sum())
-    return HeldOut(stops.astype(np.int64), score, float(np.sqrt(total / max(count, 1))))
+    return HeldOut(columns.stops, score, float(np.sqrt(total / max(count, 1))))
 
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations of k parameters on all N rows, and what a part of the rows is predicted to be without it."""
+    """Normal equations of c parameters on all N rows, and what the rows of a stop are predicted to be without them.
 
-    W: Floats
-    e: Floats
+    A stop is predicted in its directions; the rest of its rows tells of no parameter, and none tells of it.
+    """
+
+    columns: InStops
+    seen: Floats
+    """What the residuals have of the directions, shape (M,)."""
+    rest: Floats
+    """What they have beside them, shape (N,)."""
     weight: Floats
     shift: Floats
 
-    @cached_property
-    def J(self) -> Floats:
-        """Information of all rows, shape (k, k)."""
-        return np.asarray(self.W.T @ self.W)
+    @classmethod
+    def of(cls, columns: InStops, e: Floats, weight: Floats, shift: Floats) -> _Normal:
+        """Take the residuals apart."""
+        seen = columns.seen(e[:, None])[:, 0]
+        return cls(columns, seen, e - columns.spread(seen), weight, shift)
 
     @cached_property
     def d(self) -> Floats:
-        """Its vector with the pull of the prior means, shape (k,)."""
-        return np.asarray(self.W.T @ self.e + self.weight * self.shift)
+        """Information vector of all rows, with the pull of the prior means, shape (c,)."""
+        return np.asarray(self.columns.parts.T @ self.seen + self.weight * self.shift)
 
     @cached_property
     def of_fit(self) -> tuple[Floats, Floats]:
-        """``X`` with ``X X'`` the part of each row in the fit of all (N, k), and what the fit leaves (N,)."""
-        A = self.J + np.diag(self.weight)
+        """``X`` with ``X X'`` the part of each direction in the fit of all (M, c), and what the fit leaves (M,)."""
+        A = self.columns.square + np.diag(self.weight)
         unit = 1.0 / np.sqrt(np.diag(A))
         L = np.linalg.cholesky(A * np.outer(unit, unit))
-        every = np.column_stack([self.W.T * unit[:, None], self.d * unit])
+        every = np.column_stack([self.columns.parts.T * unit[:, None], self.d * unit])
         X = solve_triangular(L, every, lower=True, check_finite=False, overwrite_b=True).T
-        return X[:-1], self.e - X[:-1] @ X[-1]
+        return X[:-1], self.seen - X[:-1] @ X[-1]
 
-    def without(self, rows: Bools) -> tuple[Floats, float, Floats]:
-        """Predict rows from all others.
-
-        Parameters
-        ----------
-        rows : ndarray of bool, shape (N,)
-            n of them.
+    def without(self, k: int) -> tuple[Floats, float, Floats]:
+        """Predict the k-th stop, of n rows, from all others.
 
         Returns
         -------
@@ -107,63 +107,54 @@ class _Normal:
         spread : ndarray, shape (n,)
             Variance of each error.
         """
-        few = np.count_nonzero(rows) < len(self.weight)
-        told = self._by_rows(rows) if few else self._by_parameters(rows)
-        return self._anew(self.W[rows], self.e[rows]) if told is None else told
+        Q, rest = self.columns.directions[k], self.rest[self.columns.rows[k]]
+        if not Q.size:
+            return rest, -0.5 * float(rest @ rest), np.ones(len(rest))
+        error, score, root = self._of_fit_to_all(k) or self._anew(k)
+        # Beside its directions a row has the unit variance of white noise.
+        beside = 1.0 - np.einsum("ij,ij->i", Q, Q)
+        spread = beside + np.einsum("ij,ij->i", Q @ root, Q @ root)
+        return rest + Q @ error, score - 0.5 * float(rest @ rest), spread
 
-    def _by_rows(self, rows: Bools) -> tuple[Floats, float, Floats] | None:
-        """Work in the number of rows, from the fit to all of them; None where hardly anything else tells of a row.
+    def _of_fit_to_all(self, k: int) -> tuple[Floats, float, Floats] | None:
+        """Predict the m directions of a stop from the fit to all rows; None where hardly anything else tells of one.
 
-        With H the part of the rows in their own fit, the error is ``(I - H)^-1`` times what the fit leaves, and its
-        covariance ``(I - H)^-1``. Source: R. D. Cook, S. Weisberg, "Residuals and influence in regression" (1982), 2.2.
+        With H the part of the directions in their own fit, the error is ``(I - H)^-1`` times what the fit leaves, and
+        its covariance ``(I - H)^-1``. Source: R. D. Cook, S. Weisberg, "Residuals and influence in regression" (1982),
+        2.2.
+
+        Returns
+        -------
+        error : ndarray, shape (m,)
+        log_score : float
+        root : ndarray, shape (m, m)
+            Of the covariance of the error.
         """
-        X, error = self.of_fit[0][rows], self.of_fit[1][rows]
+        place = self.columns.places[k]
+        X, error = self.of_fit[0][place], self.of_fit[1][place]
         left = np.eye(len(X)) - X @ X.T
         L, failed = lapack.dpotrf(left, lower=1)
         if failed:
             return None
         root, _ = lapack.dtrtri(L, lower=1)
-        spread = np.einsum("ij,ij->j", root, root)
         # The sum of all inverse eigenvalues is at least the largest of them.
-        if _LEAST_LEFT * spread.sum() > 1.0 and np.linalg.eigvalsh(left)[0] < _LEAST_LEFT:
+        if _LEAST_LEFT * float(np.sum(root**2)) > 1.0 and np.linalg.eigvalsh(left)[0] < _LEAST_LEFT:
             return None
         white = root @ error
-        log_score = -0.5 * float(white @ white) + float(np.log(np.diag(L)).sum())
-        return white @ root, log_score, spread
+        return white @ root, -0.5 * float(white @ white) + float(np.log(np.diag(L)).sum()), root.T
 
-    def _by_parameters(self, rows: Bools) -> tuple[Floats, float, Floats] | None:
-        """Work in the number of parameters k, from the fit to all rows; None as of `_by_rows`.
-
-        ``(I - X X')^-1 = I + X (I - X'X)^-1 X'`` with the same determinant: ``I - X'X`` has the size k.
-        """
-        X, error = self.of_fit[0][rows], self.of_fit[1][rows]
-        left = np.eye(X.shape[1]) - X.T @ X
-        L, failed = lapack.dpotrf(left, lower=1)
-        if failed:
-            return None
-        Y = solve_triangular(L, X.T, lower=True, check_finite=False)
-        spread = 1.0 + np.einsum("ij,ij->j", Y, Y)
-        if _LEAST_LEFT * spread.sum() > 1.0 and np.linalg.eigvalsh(left)[0] < _LEAST_LEFT:
-            return None
-        white = Y @ error
-        log_score = -0.5 * float(error @ error + white @ white) + float(np.log(np.diag(L)).sum())
-        return error + white @ Y, log_score, spread
-
-    def _anew(self, W: Floats, e: Floats) -> tuple[Floats, float, Floats]:
-        """Work in the number of parameters, from the fit to the other rows.
-
-        The log of N(error; 0, I + W A^-1 W') by the matrix inversion lemma.
-        """
-        unit = 1.0 / np.sqrt(np.diag(self.J) + self.weight)
-        A = self.J - W.T @ W + np.diag(self.weight)
+    def _anew(self, k: int) -> tuple[Floats, float, Floats]:
+        """Predict the directions of a stop from the fit to the other rows, with the returns of `_of_fit_to_all`."""
+        place, every = self.columns.places[k], self.columns.parts
+        W, e = every[place], self.seen[place]
+        unit = 1.0 / np.sqrt(np.diag(self.columns.square) + self.weight)
+        A = self.columns.square - W.T @ W + np.diag(self.weight)
         inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
         error = e - W @ (inverse @ (self.d - W.T @ e))
-        root = np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
-        X = W @ root
-        M = np.eye(len(self.weight)) + X.T @ X
-        y = X.T @ error
-        chi2 = error @ error - y @ np.linalg.solve(M, y)
-        return error, -0.5 * float(chi2 + np.linalg.slogdet(M)[1]), 1.0 + np.sum(X**2, axis=1)
+        S = np.eye(len(e)) + W @ (0.5 * (inverse + inverse.T)) @ W.T
+        root = np.linalg.cholesky(S)
+        white = np.linalg.solve(root, error)
+        return error, -0.5 * float(white @ white) - float(np.log(np.diag(root)).sum()), np.asarray(root)
 
 
 def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:

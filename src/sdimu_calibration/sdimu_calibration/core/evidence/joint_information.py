@@ -33,7 +33,7 @@ class Joint:
     def of(cls, evidence: LinearEvidence, wander: Wander, earlier: Joint | None = None) -> Joint:
         """Put evidence and wander together; `earlier` is of the same signatures, or of the first ones of them."""
         if earlier is None:
-            return cls(evidence, wander, np.zeros((0, wander.U.shape[1])))
+            return cls(evidence, wander, np.zeros((0, wander.U.parts.shape[1])))
         known = earlier.information.J[: len(earlier.evidence.names), len(earlier.evidence.names) :]
         return cls(evidence, wander, known)
 
@@ -42,9 +42,9 @@ class Joint:
         """Information on the columns of the evidence, then on the wander, in white noise."""
         W, U, e = self.evidence.W, self.wander.U, self.evidence.e
         own, n = self.evidence.information, len(self.across)
-        across = np.vstack([self.across, self.wander.across(W[:, n:])])
-        J = np.block([[own.J, across], [across.T, self.wander.square]])
-        return Information(J, np.concatenate([own.d, U.T @ e]))
+        across = np.vstack([self.across, U.across(W[:, n:])])
+        J = np.block([[own.J, across], [across.T, U.square]])
+        return Information(J, np.concatenate([own.d, U.across(e[:, None])[0]]))
 
     def on_wander(self, known: Ints, weight: Floats) -> NoiseInformation:
         """Information on the wandering biases with some parameters estimated along.

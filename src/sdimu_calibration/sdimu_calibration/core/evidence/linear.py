@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.conditions import Conditions
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretch_effects
@@ -64,8 +65,8 @@ class LinearEvidence(ABC):
     """When the recording stood and turned."""
     coefficients: int
     """How many of the model's parameters, the first ones, are sensor coefficients."""
-    noise: Floats = field(default_factory=lambda: np.zeros((0, 0)), kw_only=True)
-    """Signatures of the modes of noise with a memory, shape (N, r)."""
+    noise: InStops | None = field(default=None, kw_only=True)
+    """Signatures of the modes of noise with a memory, N rows and r columns; None without any."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
     """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
@@ -169,27 +170,28 @@ class LinearEvidence(ABC):
         ndarray, shape (N, k)
             By the matrix inversion lemma, in the number of modes; in the same units.
         """
-        if not self.noise.size:
+        if self.noise is None:
             return columns
-        Z = divided(self._noise_factor, columns.T @ self.noise)
-        return np.asarray(columns - self.noise @ divided(self._noise_factor, Z.T, turned=True))
+        Z = divided(self._noise_factor, self.noise.across(columns))
+        return np.asarray(columns - self.noise.times(divided(self._noise_factor, Z.T, turned=True)))
 
     @cached_property
     def _noise_factor(self) -> Floats:
         """Cholesky factor of the information on the modes of the noise, shape (r, r)."""
-        return factor(np.eye(self.noise.shape[1]) + self.noise.T @ self.noise)
+        square = np.zeros((0, 0)) if self.noise is None else self.noise.square
+        return factor(np.eye(len(square)) + square)
 
-    def with_noise(self: E, modes: Floats, worked_out: Information | None = None) -> E:
+    def with_noise(self: E, modes: InStops | None, worked_out: Information | None = None) -> E:
         """Return the evidence with other modes of noise with a memory.
 
         Parameters
         ----------
-        modes : ndarray, shape (N, r)
-            Signatures of the modes in the whitened residuals, each of unit variance.
+        modes : InStops, optional
+            Signatures of the modes in the whitened residuals, each of unit variance; None for white noise.
         worked_out : Information, optional
             In that noise.
         """
-        return replace(self, noise=modes, worked_out=worked_out) if modes.size or self.noise.size else self
+        return self if modes is None and self.noise is None else replace(self, noise=modes, worked_out=worked_out)
 
     def with_effects(self: E, effects: Sequence[Effect], signature: Floats | None = None) -> E:
         """Return the evidence with the parameters of more effects behind the candidates it has.

@@ -73,7 +73,7 @@ def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]
     if t is None or moves_within(half, terms) < MOVES:
         return half
     inner = inner_noise(t, evidence.signature, half.cut, terms)
-    return replace(half, U=inner.whitened(half.U), inner=inner, plain=half)
+    return replace(half, U=half.U.whitened(inner), inner=inner, plain=half)
 
 
 def moves_within(wander: Wander, terms: Sequence[NoiseTerm]) -> float:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.side_by_side import side_by_side
 
 _SEEN = 5e-2
 """Ratio of the information on a mode to that of its prior below which it is left out: the data say nothing of it."""
-_BLOCK = 60
-"""Number of columns that are multiplied at a time: of a hundred stretches a tenth, which begin at nearly one time."""
 _LOOKED_AT = 12
 """Number of stretches at rest of which the halves are compared: those of one test are much alike."""
 
@@ -28,8 +25,8 @@ _LOOKED_AT = 12
 class Modes:
     """Independent modes of noise with a memory, r of unit variance."""
 
-    columns: Floats
-    """Signatures in the whitened residuals, shape (N, r)."""
+    columns: InStops
+    """Signatures in the whitened residuals, N rows and r columns."""
     mean: Floats
     """What each mode adds to the mean error of each sensor over all dwells (SI), shape (6, r)."""
     unseen: Floats
@@ -43,8 +40,8 @@ class Wander:
 
     cut: Stretches
     """n cells."""
-    U: Floats
-    """Shape (N, 6 n). Signatures; column ``6 cell + channel``."""
+    U: InStops
+    """Signatures, N rows and 6 n columns: column ``6 cell + channel``."""
     learned: tuple[NoiseTerm, ...] | None = None
     """Noise that the test asks for in these stretches, where their length hung on it; None where nobody looked."""
     inner: InnerNoise | None = None
@@ -66,60 +63,14 @@ class Wander:
         """The same in white noise."""
         return self if self.plain is None else self.plain
 
-    @cached_property
-    def square(self) -> Floats:
-        """Information on the mean errors, ``U'U``.
-
-        Returns
-        -------
-        ndarray, shape (6 n, 6 n)
-            Inverse squares of the units (SI) of the errors.
-        """
-        out = np.empty((self.U.shape[1], self.U.shape[1]))
-
-        def fill(block: tuple[slice, int]) -> None:
-            columns, since = block
-            out[columns, : columns.stop] = self.U[since:, columns].T @ self.U[since:, : columns.stop]
-            out[: columns.stop, columns] = out[columns, : columns.stop].T
-
-        side_by_side(fill, self._blocks)
-        return out
-
-    def across(self, W: Floats) -> Floats:
-        """Information across parameters and the mean errors, ``W'U``.
-
-        Parameters
-        ----------
-        W : ndarray, shape (N, q)
-            Signatures of the parameters.
-
-        Returns
-        -------
-        ndarray, shape (q, 6 n)
-            Inverse products of the units (SI) of parameters and errors.
-        """
-        out = np.empty((W.shape[1], self.U.shape[1]))
-
-        def fill(block: tuple[slice, int]) -> None:
-            columns, since = block
-            out[:, columns] = W[since:].T @ self.U[since:, columns]
-
-        side_by_side(fill, self._blocks)
-        return out
-
-    @cached_property
-    def _blocks(self) -> list[tuple[slice, int]]:
-        """Columns in the order of time, and the first row in which each block of them shows: none shows before."""
-        places = [slice(k, min(k + _BLOCK, self.U.shape[1])) for k in range(0, self.U.shape[1], _BLOCK)]
-        return [(place, int(np.argmax(self.U[:, place].any(axis=1)))) for place in places]
-
     @classmethod
     def of(cls, evidence: LinearEvidence, share: float = 1.0) -> Wander:
         """Work out the signatures for the test of an evidence, in stretches of this share of the usual length."""
         cut = stretches(evidence.times, share)
         cut = replace(cut, conditions=evidence.conditions(cut))
         halves, moved = between_halves(evidence, cut)
-        return cls(cut, evidence.constant_signature(cut), inner=evidence.inner, halves=halves, moved=moved)
+        U = InStops.of(evidence.constant_signature(cut), evidence.stop)
+        return cls(cut, U, inner=evidence.inner, halves=halves, moved=moved)
 
     def with_functions(self, evidence: LinearEvidence) -> Wander:
         """Return the same with functions of the attitude behind its stretches; itself where nobody knows that.
@@ -134,7 +85,7 @@ class Wander:
             return self
         # Roots that the stretches have worked out are shorter.
         cut = replace(self.cut, functions=functions, _modes={})
-        return replace(self, cut=cut, U=np.hstack([self.U, evidence.signature(functions.effects())]))
+        return replace(self, cut=cut, U=self.U.beside(evidence.signature(functions.effects())))
 
     def modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         """Work out independent modes of noise, those of which the data say nothing as a covariance of the means."""
@@ -146,11 +97,11 @@ class Wander:
 
     def _modes(self, terms: Sequence[NoiseTerm]) -> Modes:
         root = root_of(terms, self.cut)
-        values, vectors = np.linalg.eigh(root.T @ self.square @ root)
+        values, vectors = np.linalg.eigh(root.T @ self.U.square @ root)
         mean = np.einsum("s,scr->cr", self.cut.in_dwells, root.reshape(self.cut.cells, 6, -1)) @ vectors
         seen = values > _SEEN
         hidden = mean[:, ~seen]
-        return Modes(self.U @ (root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
+        return Modes(self.U.combined(root @ vectors[:, seen]), mean[:, seen], hidden @ hidden.T)
 
 
 def between_halves(evidence: LinearEvidence, cut: Stretches) -> tuple[Floats, Floats]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.evidence.wander import Wander
@@ -150,13 +151,13 @@ def whitened(columns: Floats, wander: Wander, terms: tuple[NoiseTerm, ...]) -> F
     return unit_noise(wander.modes(terms).columns, inner)
 
 
-def unit_noise(modes: Floats, columns: Floats) -> Floats:
+def unit_noise(modes: InStops, columns: Floats) -> Floats:
     """Multiply with ``(I + modes modes')^-1/2``.
 
     Parameters
     ----------
-    modes : ndarray, shape (N, r)
-        Signatures of modes of unit variance.
+    modes : InStops
+        Signatures of modes of unit variance, N rows.
     columns : ndarray, shape (N, m)
 
     Returns
@@ -164,8 +165,9 @@ def unit_noise(modes: Floats, columns: Floats) -> Floats:
     ndarray, shape (N, m)
         In the units of `columns`.
     """
-    squares, V = np.linalg.eigh(modes.T @ modes)
+    squares, V = np.linalg.eigh(modes.square)
     root = np.sqrt(1.0 + np.maximum(squares, 0.0))
     # 1 - 1/root over the square, without the difference of what is nearly one.
     share = 1.0 / (root * (1.0 + root))
-    return np.asarray(columns - modes @ (V @ (share[:, None] * (V.T @ (modes.T @ columns)))))
+    taken = V @ (share[:, None] * (V.T @ modes.across(columns).T))
+    return np.asarray(columns - modes.times(taken))

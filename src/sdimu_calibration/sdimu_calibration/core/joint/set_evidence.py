@@ -15,6 +15,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.linear import LinearEvidence, candidate_priors
 from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight
@@ -163,7 +164,8 @@ def white_power_on(
         return rows, wide
     components = columns_of(fit.varying, fit.names)
     modes = np.hstack([rows.A[:, c.columns] * t for c, t in zip(components, fit.tau, strict=True)])
-    white = unit_noise(modes, np.column_stack([*wide, rows.A, rows.y]))
+    together = InStops.of(modes, np.zeros(len(modes), dtype=np.int64))
+    white = unit_noise(together, np.column_stack([*wide, rows.A, rows.y]))
     parts = np.split(white, np.cumsum([*(columns.shape[1] for columns in wide), len(names)]), axis=1)
     return Rows(parts[-2], parts[-1][:, 0]), parts[:-2]
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.attitude_functions import way
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence
+from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
@@ -85,12 +86,12 @@ def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
     return reduced(wide), _places(evidence, cut, fit.test.recording.temperature)
 
 
-def _in_turns(wander: Wander, terms: Sequence[NoiseTerm]) -> Floats:
-    """Signatures (N, r) of what noise with a memory does in turns, of modes of unit variance."""
+def _in_turns(wander: Wander, terms: Sequence[NoiseTerm]) -> InStops:
+    """Signatures of what noise with a memory does in turns, of modes of unit variance."""
     turning = np.zeros(wander.cut.cells, dtype=bool)
     turning[: len(wander.cut)] = wander.cut.turning
     cells = np.repeat(turning, len(CHANNELS))
-    return np.asarray(wander.U[:, cells] @ root_of(terms, wander.cut)[cells])
+    return wander.U.only(cells).combined(root_of(terms, wander.cut)[cells])
 
 
 def _dwells(times: Timetable) -> Stretches:

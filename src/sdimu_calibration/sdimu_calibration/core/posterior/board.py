@@ -15,7 +15,6 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import of_the_sensor
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, likelihood
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.noise_root import folded, root_of, spread
 from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken, taken
@@ -121,13 +120,6 @@ class Board(Generic[E]):
         """Sum of the squared residuals with no effect added, in a noise (1), and their number."""
         e, one = self.evidence.e, self.as_stated.in_noise(noise)
         return float(e @ e) - float(one.modes.z @ one.modes.z), len(e)
-
-    @cached_property
-    def _nothing(self) -> NoiseInformation:
-        """Information on the wander beside no effect."""
-        if self.joint is None:
-            raise AssertionError("a board without wander has no noise with a memory")
-        return self.joint.on_wander(self.evidence.model, self.evidence.weight)
 
     @cached_property
     def use(self) -> Ints:
@@ -242,9 +234,14 @@ class Board(Generic[E]):
 
     def likelihood(self, noise: NoiseModel) -> float:
         """Log likelihood (1) of no effect in a noise, over that in white noise."""
-        if not noise.terms or self.joint is None or self.wander is None:
-            return 0.0
-        return likelihood(self._nothing, self.wander.cut, noise.terms) - self._nothing.fitted
+        white, one = self.as_stated.in_noise(NoiseModel()), self.as_stated.in_noise(noise)
+        return one.modes.gain + self._of_coefficients(one) - self._of_coefficients(white)
+
+    def _of_coefficients(self, one: InNoise) -> float:
+        """Log likelihood (1) that the coefficients add in a noise, but for what is the same in all."""
+        weight = self.evidence.weight
+        p = len(weight)
+        return Information(one.J[:p, :p], one.d[:p]).log_likelihood(weight)
 
     def columns(self, members: Members) -> list[int]:
         """Columns of the evidence of the members of a model."""
@@ -339,7 +336,7 @@ class Board(Generic[E]):
         one, evidence = self.as_stated.in_noise(noise), self.evidence
         own, across, d = np.einsum("ij,ij->j", W, W), W.T @ evidence.W[:, self.keep[at]], W.T @ evidence.e
         if noise.terms and self.wander is not None:
-            B = divided(one.modes.L, (self.wander.across(W) if on_wander is None else on_wander) @ one.R)
+            B = divided(one.modes.L, (self.wander.U.across(W) if on_wander is None else on_wander) @ one.R)
             own = own - np.einsum("ri,ri->i", B, B)
             across, d = across - B.T @ one.modes.Z[:, at], d - one.modes.z @ B
         return own / self.excess, across / self.excess, d / self.excess

@@ -65,7 +65,7 @@ def near(found: Posterior[E], effects: Sequence[Effect], signature: Floats) -> B
     likely = [found.best.noise, found.told.noise, *(noise for noise, p in found.noises if p > _LIKELY)]
     best = max(offset + data.at(one).score for offset, data in map(board.data, likely) for one in models)
     prior = _prior(board, candidates)
-    on_wander = None if board.wander is None else board.wander.across(W)
+    on_wander = None if board.wander is None else board.wander.U.across(W)
     keep = np.zeros(len(candidates), dtype=bool)
     for noise in dict.fromkeys([NoiseModel(), *likely]):
         offset, every = board.data(noise)
