@@ -55,6 +55,20 @@ def test_columns_beside_others_bring_the_directions_that_are_new(dense, sparse):
     np.testing.assert_allclose(wider.square * np.outer(unit, unit), (every * unit).T @ (every * unit), atol=1e-10)
 
 
+@pytest.mark.parametrize("weak", [1e-7, 3e-9, 1e-9, 3e-10, 1e-11, 1e-13])
+def test_directions_of_any_weakness_stay_orthonormal(weak):
+    rng = np.random.default_rng(5)
+    strong = rng.standard_normal((300, 60)) @ rng.standard_normal((60, 200))
+    columns = strong + weak * rng.standard_normal((300, 40)) @ rng.standard_normal((40, 200))
+    found = InStops.of(columns, np.zeros(300, dtype=np.int64))
+    Q = found.directions[0]
+    np.testing.assert_allclose(Q.T @ Q, np.eye(Q.shape[1]), atol=1e-12)
+    length = np.linalg.norm(columns, axis=0)
+    assert np.abs((found.spread(found.parts) - columns) / length).max() < 2e-8
+    square = columns.T @ columns
+    np.testing.assert_allclose(found.square, square, atol=1e-14 * np.abs(square).max())
+
+
 def test_none_is_a_matrix_of_no_columns():
     none = InStops.none(STOP)
     assert none.square.shape == (0, 0)

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.posterior import coefficients
 from sdimu_calibration.core.posterior.coefficients import Averages
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.search import WINDOW
 
 
-def test_moments_over_all_models_are_those_of_the_mixture(bench):
+def test_moments_over_all_models_are_those_of_the_mixture(bench, monkeypatch):
+    # Without what the averaged models lack.
+    monkeypatch.setattr(coefficients, "_LEAST_LACKING", 1.0)
     hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_warm_up_y(tau=300 s)=0.07 deg/h")
     diagnosis = bench.diagnosis(12, hidden, "recommended")
     found = diagnosis.found.posterior
@@ -97,3 +103,41 @@ def explained(board, members):
     scale = 1.0 / np.sqrt(np.diag(A))
     d = data.d[at] * scale
     return float(d @ np.linalg.solve(A * np.outer(scale, scale), d))
+
+
+def test_what_no_averaged_model_holds_counts_with_its_probability_beside_the_likeliest(bench):
+    """The likeliest model alone, against the mixture of it with each candidate beside it, by the definition."""
+    diagnosis = bench.diagnosis(12, ("accel_quadratic_z=25 ug/g^2",), "recommended")
+    found = diagnosis.found.posterior
+    averages = Averages(found.board, diagnosis.fit.dwell_means)
+    best = found.best
+    near = found.board.data(best.noise)[1].at(best.members)
+    table = near.gains()
+    table[near.columns] = -np.inf
+    wider = [(0.0, best.members)] + [
+        (float(table[k, width]), tuple(sorted((*best.members, (int(k), int(width))))))
+        for k, width in zip(*np.nonzero(table > -WINDOW), strict=True)
+    ]
+    # Each candidate is there or not, whatever the others are: the odds of two are the products of theirs.
+    weight = np.exp([gain for gain, _ in wider])
+    assert 0.05 < weight[1:].sum() < 1.0
+    each = [averages.of_model(members, best.noise) for _, members in wider]
+    alone = averages.of_model(best.members, best.noise)
+    by_candidate = {}
+    for w, (_, members), one in zip(weight[1:], wider[1:], each[1:], strict=True):
+        (number,) = {k for k, _ in members} - {k for k, _ in best.members}
+        by_candidate.setdefault(number, []).append((w, one))
+    mean, second = alone.mean.copy(), alone.covariance.copy()
+    for own in by_candidate.values():
+        total = 1.0 + sum(w for w, _ in own)
+        for w, one in own:
+            apart = one.mean - alone.mean
+            mean += w / total * apart
+            second += w / total * (one.covariance - alone.covariance + np.outer(apart, apart))
+    told = averages.of(replace(found, models=(replace(best, probability=1.0),)))
+    scale = np.sqrt(np.diag(alone.covariance))
+    scale[scale == 0.0] = 1.0
+    np.testing.assert_allclose(told.mean / scale, mean / scale, atol=0.02)
+    grown = np.diag(second) / scale**2
+    assert grown.max() > 1.3
+    np.testing.assert_allclose(np.diag(told.covariance) / scale**2, grown, atol=0.02, rtol=0.02)

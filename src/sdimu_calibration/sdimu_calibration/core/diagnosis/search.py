@@ -138,6 +138,8 @@ def with_steps(found: Search[E]) -> Search[E]:
     found : Search
         Of the last round: what it says costs more than what it finds.
     """
+    if found.posterior is not None and found.posterior.board.has_noises:
+        found = replace(found, posterior=found.posterior.in_every_noise())
     problem, chosen = Problem(found.evidence), found.chosen.tolist()
     steps: list[Step] = []
     before = problem.held_out([])

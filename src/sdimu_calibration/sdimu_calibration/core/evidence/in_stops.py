@@ -20,8 +20,9 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.side_by_side import side_by_side
 
-_LEAST = 1e-11
-"""Part of a stop in a column, over the whole column (1), below which it is left out: rounding is a thousandth of it."""
+_LEAST = 1e-9
+"""Part of a stop in a column, over the whole column (1), below which it is left out: the square of it, which is what
+information loses, is rounding."""
 _SKETCHED = 48
 """Number of directions (1) that are looked for at a time: a stop of an hour's test has one to three times as many."""
 
@@ -225,12 +226,13 @@ def _more(known: Floats, columns: Floats, unit: Floats) -> Floats:
     while left > 0:
         count = min(_SKETCHED, left)
         fresh = columns @ (unit[:, None] * rng.standard_normal((len(unit), count)))
-        for _ in range(2):
-            fresh -= Q @ (Q.T @ fresh)
+        fresh -= Q @ (Q.T @ fresh)
         turned, R = np.linalg.qr(fresh)
         seen = np.abs(np.diag(R)) > _LEAST
         # Behind the first direction that is rounding all are.
         some = count if seen.all() else int(np.argmin(seen))
-        Q = np.hstack([Q, turned[:, :some]])
+        turned = turned[:, :some]
+        # A small part of what is known already is a large one of a direction that was small.
+        Q = np.hstack([Q, np.linalg.qr(turned - Q @ (Q.T @ turned))[0]])
         left = left - count if some == count else 0
     return np.ascontiguousarray(Q)

@@ -15,11 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.selection import resolve
@@ -28,13 +28,23 @@ from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.taken import divided
 from sdimu_calibration.core.posterior.board import Board
-from sdimu_calibration.core.posterior.models import Members
+from sdimu_calibration.core.posterior.models import Expansion, Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.posterior.posterior import Posterior
+from sdimu_calibration.core.posterior.posterior import Posterior, Weighed
+from sdimu_calibration.core.posterior.prior import WIDTHS
+from sdimu_calibration.core.posterior.search import WINDOW
 from sdimu_calibration.core.recording import DataError
 
 _MOST = 400
 """Number of models that are averaged at most, the likeliest first: those behind weigh less than a thousandth each."""
+_BESIDE = 40
+"""Number of models (1) beside which the probability of what no averaged model holds is taken: the likeliest, which are
+nearly alike in what they lack."""
+_LEAST_LACKING = 1e-4
+"""Probability (1) of a candidate that the averaged models lack, below which it is left out: it moves no sigma by a part
+in a hundred unless it stands ten sigma out."""
+_LARGEST_GAIN = 100.0
+"""Log posterior (1) of a candidate beside a model from which it is certain: beyond, its odds are no number."""
 _IS_THE_CAUSE = 0.5
 """Probability (1) that an equation that no physics names moves the coefficients as its cause does: nothing in the data
 says so, nothing speaks against it."""
@@ -62,6 +72,32 @@ class _Mean:
     """Shape (6, 6)."""
 
 
+@dataclass(frozen=True)
+class _Beside:
+    """Candidates beside a model, each by itself: whether one is there, of which width, and how large."""
+
+    probability: Floats
+    """With each width (1), shape (u, widths); zero of what is in the model."""
+    size: Floats
+    """In prior sizes (1), shape (u, widths)."""
+    variance: Floats
+    """(1), shape (u, widths)."""
+
+    @classmethod
+    def of(cls, near: Expansion) -> _Beside:
+        """Work it out in closed form, of what is within the window of the model."""
+        gains = near.gains()
+        odds = np.where(gains > -WINDOW, np.exp(np.minimum(gains, _LARGEST_GAIN)), 0.0)
+        odds[near.columns] = 0.0
+        variance = 1.0 / (near.c[:, None] + np.array(WIDTHS) ** -2.0)
+        return cls(odds / (1.0 + odds.sum(axis=1, keepdims=True)), near.r[:, None] * variance, variance)
+
+    def moments(self, some: Ints) -> tuple[Floats, Floats]:
+        """First and second moment of the sizes of some candidates, zero where they are not there; (1), shape (k,)."""
+        p, size = self.probability[some], self.size[some]
+        return (p * size).sum(axis=1), (p * (size**2 + self.variance[some])).sum(axis=1)
+
+
 class Averages:
     """Moments of the coefficients in the models of a posterior.
 
@@ -85,22 +121,16 @@ class Averages:
         as_told : bool
             Equations that no physics names are the cause; else they may stand for another one.
         """
-        evidence, data, one = self.board.evidence, self.board.in_noise(noise), self._mean(noise)
-        p, q = len(evidence.weight), evidence.coefficients
-        _, weight = self.board.parameters(members)
-        at = np.array([*range(p), *(p + k for k, _ in members)], dtype=np.int64)
-        covariance = solved(data.J[np.ix_(at, at)] + np.diag(weight), np.eye(len(at)))
+        data, one = self.board.in_noise(noise), self._mean(noise)
+        p, q = len(self.board.evidence.weight), self.board.evidence.coefficients
+        at, covariance = self._parameters(members, noise)
         estimate = covariance @ data.d[at]
-        T = np.eye(q, len(at))
+        T = self._coefficients(members, noise)
         constant, own = np.zeros(q), np.zeros((q, q))
-        rows = {c: evidence.names.index(name) for c, name in enumerate(bias.NAMES) if name in evidence.names[:q]}
-        for channel, row in rows.items():
-            T[row] -= one.moved[channel, at]
+        for channel, row in self._biases.items():
             constant[row] = one.mean[channel]
-            for other, column in rows.items():
+            for other, column in self._biases.items():
                 own[row, column] = one.covariance[channel, other]
-        for place, (number, _) in enumerate(members, start=p):
-            T[:, place] += self._shift(number)
         told = Moments(T @ estimate + constant, T @ covariance @ T.T + own)
         equations = {
             place: one.effect.terms[0].channel
@@ -117,6 +147,30 @@ class Averages:
             seen = float(estimate[of_sensor] @ _inverse_times(of_sensor, covariance, estimate))
             hidden += self._out_of_sight(channel, seen, data.J)
         return _with_another_cause(told, moved, hidden)
+
+    def _parameters(self, members: Members, noise: NoiseModel) -> tuple[Ints, Floats]:
+        """Give the columns of the parameters of a model in its noise (k,), and their covariance (k, k), SI."""
+        p = len(self.board.evidence.weight)
+        at = np.array([*range(p), *(p + k for k, _ in members)], dtype=np.int64)
+        information = self.board.in_noise(noise).J[np.ix_(at, at)] + np.diag(self.board.parameters(members)[1])
+        return at, solved(information, np.eye(len(at)))
+
+    def _coefficients(self, members: Members, noise: NoiseModel) -> Floats:
+        """Take the parameters of a model to the q coefficients, a bias as its mean over the dwells; shape (q, k)."""
+        p, q = len(self.board.evidence.weight), self.board.evidence.coefficients
+        at = [*range(p), *(p + k for k, _ in members)]
+        T = np.eye(q, len(at))
+        for channel, row in self._biases.items():
+            T[row] -= self._mean(noise).moved[channel, at]
+        for place, (number, _) in enumerate(members, start=p):
+            T[:, place] += self._shift(number)
+        return T
+
+    @cached_property
+    def _biases(self) -> dict[int, int]:
+        """Row of the bias of each channel among the coefficients."""
+        names = self.board.evidence.names[: self.board.evidence.coefficients]
+        return {c: names.index(name) for c, name in enumerate(bias.NAMES) if name in names}
 
     def _out_of_sight(self, channel: int, seen: float, J: Floats) -> Floats:
         """Variance of what another cause in the place of equations of a sensor adds to its coefficients.
@@ -151,7 +205,49 @@ class Averages:
         mean = weight @ means
         apart = means - mean
         within = np.einsum("m,mij->ij", weight, np.array([one.covariance for one in each]))
-        return Moments(mean, within + (weight[:, None] * apart).T @ apart)
+        left_out = self._left_out(models, weight)
+        return Moments(mean + left_out.mean, within + (weight[:, None] * apart).T @ apart + left_out.covariance)
+
+    def _left_out(self, models: Sequence[Weighed], weight: Floats) -> Moments:
+        """Say what candidates add to the moments by the part of their probability that some models lack.
+
+        With many effects that are open there are more models than can be averaged, and what is improbable in each of
+        them is in none that is. Its probability beside the likeliest is known in closed form.
+
+        Parameters
+        ----------
+        models : sequence of Weighed
+            That are averaged.
+        weight : ndarray, shape (models,)
+            Of each (1).
+        """
+        q, held = self.board.evidence.coefficients, np.zeros(len(self.board.use))
+        for model, w in zip(models, weight.tolist(), strict=True):
+            held[[k for k, _ in model.members]] += w
+        likely = weight[:_BESIDE] / weight[:_BESIDE].sum()
+        beside = [_Beside.of(self.board.data(m.noise)[1].at(m.members)) for m in models[:_BESIDE]]
+        probability = np.array([w * one.probability.sum(axis=1) for w, one in zip(likely, beside, strict=True)])
+        total = probability.sum(axis=0)
+        lacks = np.maximum(total - held, 0.0)
+        some = np.flatnonzero(lacks > _LEAST_LACKING)
+        share = lacks[some] / total[some]
+        mean, covariance = np.zeros(q), np.zeros((q, q))
+        for model, w, one in zip(models, likely.tolist(), beside, strict=False):
+            moved = self._moved_by(some, model) * self.board.size[some]
+            first, second = one.moments(some)
+            mean += w * moved @ (share * first)
+            covariance += w * (moved * (share * second)) @ moved.T
+        return Moments(mean, covariance)
+
+    def _moved_by(self, some: Ints, model: Weighed) -> Floats:
+        """Give the change of the q coefficients per unit of some candidates beside a model, shape (q, candidates)."""
+        at, covariance = self._parameters(model.members, model.noise)
+        columns = len(self.board.evidence.weight) + some
+        J = self.board.in_noise(model.noise).J
+        out = -self._coefficients(model.members, model.noise) @ (covariance @ J[np.ix_(at, columns)])
+        for channel, row in self._biases.items():
+            out[row] -= self._mean(model.noise).moved[channel, columns]
+        return np.asarray(out + np.column_stack([self._shift(k) for k in some.tolist()] or [out]))
 
     def _shift(self, number: int) -> Floats:
         """Mean over the dwells that a candidate adds to each of q coefficients, per unit; shape (q,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic
 
@@ -259,6 +259,12 @@ class Posterior(Generic[E]):
         """Columns of what may be in the place of a member of the told model, the likeliest first."""
         return [int(self.board.use[number]) for number in self.classes[self.place_of(column)]]
 
+    def in_every_noise(self) -> Posterior[E]:
+        """Weigh all kinds of noise beside the best effects: a search goes on with those alone that it began with."""
+        board = self.board.as_stated
+        beside = _in_excess(board.noises(self.best.members), self.board.excess)
+        return replace(self, noises=_noises(self.models, beside))
+
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
         """Probability that a triad has noise of one of some kinds."""
         have = [any(t.triad == triad and t.kind in kinds for t in noise.terms) for noise, _ in self.noises]
@@ -330,8 +336,12 @@ def posterior(
     starts = [*ends, *crossed(data[0][1], members)]
     found = window([d for _, d in data], [offset for offset, _ in data], starts)
     models = _weighed(found, noises)
-    beside = [((score - noise.log_prior) / board.excess + noise.log_prior, noise) for score, noise in beside]
-    return Posterior(board, models, _noises(models, beside))
+    return Posterior(board, models, _noises(models, _in_excess(beside, board.excess)))
+
+
+def _in_excess(beside: Sequence[tuple[float, NoiseModel]], excess: float) -> list[tuple[float, NoiseModel]]:
+    """Scale likelihoods of noises beside effects to a variance over that of the noises (1)."""
+    return [((score - noise.log_prior) / excess + noise.log_prior, noise) for score, noise in beside]
 
 
 def noises_of(board: Board[E]) -> list[NoiseModel]:
