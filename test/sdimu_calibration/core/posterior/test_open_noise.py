@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search, with_steps
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import RANDOM_WALK, TRIADS, NoiseTerm
 
 
 @pytest.fixture(scope="module")
-def found(bench):
+def found(searched):
+    return searched.posterior
+
+
+@pytest.fixture(scope="module")
+def searched(bench):
     """A random walk in both triads, of a size that is seen and no more, on the signatures of a fit."""
     fit = bench.fit(5, (), "recommended")
     ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), False)
@@ -25,7 +30,7 @@ def found(bench):
     e = rng.standard_normal(len(evidence.e)) + wander.U.times(error)
     known = replace(evidence.information, d=evidence.W.T @ e)
     seen = replace(evidence, e=e, shift=np.zeros(len(evidence.shift)), worked_out=known)
-    return search(seen, ground.allowed, wander).posterior
+    return search(seen, ground.allowed, wander)
 
 
 def shares(noises):
@@ -51,3 +56,21 @@ def test_each_kind_has_the_probability_that_it_has_beside_the_best_effects(found
 def test_probabilities_of_all_noises_add_to_one(found):
     assert sum(p for _, p in found.noises) == pytest.approx(1.0)
     assert {m.noise.kinds for m in found.models} <= {noise.kinds for noise, _ in found.noises}
+
+
+def test_a_search_that_goes_on_from_one_noise_weighs_all_kinds_in_the_end(searched):
+    """As the test of each kind above, of a search that looked for the kinds of the likeliest noise alone."""
+    window = searched.posterior
+    beside = window.board.noises(window.best.members)
+    best = max(score for score, _ in beside)
+    alone = shares([(np.exp(score - best), noise) for score, noise in beside])
+    one = replace(window, noises=window.noises[:1])
+    evidence, board = searched.white, window.board
+    on = search(evidence, board.allowed, board.wander, earlier=replace(searched, posterior=one))
+    open_ones = {key for key, p in alone.items() if 0.03 < p < 0.9}
+    assert any(on.posterior.of_noise(triad, [kind]) == 0.0 for triad, kind in open_ones)
+    ended = with_steps(on).posterior
+    for triad, kind in open_ones:
+        # A tenth, the bin of a campaign of reliability: effects were looked for in other noises.
+        assert ended.of_noise(triad, [kind]) == pytest.approx(alone[triad, kind], abs=0.1), (triad, kind)
+    assert sum(p for _, p in ended.noises) == pytest.approx(1.0)

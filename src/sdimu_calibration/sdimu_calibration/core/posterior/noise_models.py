@@ -121,6 +121,11 @@ class NoiseModel:
         return frozenset(t.identity for t in self.terms)
 
     @property
+    def triads(self) -> frozenset[str]:
+        """Triads that have noise."""
+        return frozenset(t.triad for t in self.terms)
+
+    @property
     def wanders_alone(self) -> bool:
         """Whether no term hangs on attitude, rate or turns, as a missing effect does."""
         return not any(t.kind in DRAWN for t in self.terms)

@@ -373,7 +373,10 @@ def _noises(
     out = dict(weight)
     for _, noise in beside:
         if noise.key not in kinds and known:
-            like = min(known, key=lambda one: (len(one.key ^ noise.key), -score[one.key]))
+            # Beside no noise in a triad effects stand in its place.
+            like = min(
+                known, key=lambda one: (len(one.triads ^ noise.triads), len(one.key ^ noise.key), -score[one.key])
+            )
             out[noise] = weight[like] * float(np.exp(score[noise.key] - score[like.key]))
     total = sum(out.values())
     return tuple(sorted(((noise, w / total) for noise, w in out.items()), key=lambda one: -one[1]))
