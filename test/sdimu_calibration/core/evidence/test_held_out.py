@@ -67,3 +67,23 @@ def test_a_stop_that_tells_of_nothing_is_predicted_as_white_noise(fitted):
     np.testing.assert_allclose(error, [2.0, -1.0])
     np.testing.assert_allclose(spread, 1.0)
     assert score == pytest.approx(-2.5)
+
+
+@pytest.mark.parametrize("ratio", [1e5, 1e7, 1e8, 1e10])
+def test_a_stop_that_alone_tells_of_two_parameters_is_predicted_as_badly_as_their_priors_say(ratio):
+    rng = np.random.default_rng(3)
+    stop = np.repeat([0, 1], 30)
+    W, e = np.zeros((60, 3)), rng.standard_normal(60)
+    W[:, 0], W[30:, 1:] = rng.standard_normal(60), ratio * rng.standard_normal((30, 2))
+    normal = _Normal.of(InStops.of(W, stop), e, np.ones(3), np.zeros(3))
+    _, score, _ = normal.without(1)
+    # The two by themselves, known by their priors alone; the third by the first stop and its prior.
+    spread = W[30:, 0] / np.sqrt(1.0 + W[:30, 0] @ W[:30, 0])
+    mean = W[30:, 0] * (W[:30, 0] @ e[:30]) / (1.0 + W[:30, 0] @ W[:30, 0])
+    Q, R = np.linalg.qr(W[30:, 1:])
+    outside = np.linalg.qr(np.hstack([Q, np.eye(30)]))[0][:, 2:30].T
+    # Where the two parameters are, nothing counts beside them; outside them there is the third alone.
+    S = np.eye(28) + np.outer(outside @ spread, outside @ spread)
+    error = outside @ (e[30:] - mean)
+    right = -0.5 * (error @ np.linalg.solve(S, error) + np.linalg.slogdet(S)[1]) - np.log(np.abs(np.diag(R))).sum()
+    assert score == pytest.approx(right, abs=1e-3)

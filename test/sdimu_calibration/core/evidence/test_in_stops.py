@@ -89,7 +89,21 @@ def test_whitening_is_that_of_the_dense_matrix(dense, sparse):
         np.testing.assert_allclose(Q.T @ Q, np.eye(Q.shape[1]), atol=1e-12)
 
 
-def test_a_stretch_across_two_stops_is_refused(sparse):
-    part = _Part(slice(45, 55), np.eye(10)[:, :1], np.array([0.5]))
-    with pytest.raises(ValueError, match="one stop"):
-        sparse.whitened(InnerNoise((part,)))
+def test_a_rest_that_two_stops_share_is_whitened_as_one(dense, sparse):
+    Q = np.linalg.qr(np.random.default_rng(2).standard_normal((10, 2)))[0]
+    inner, unit = InnerNoise((_Part(slice(45, 55), Q, np.array([0.9, 0.5])),)), 1.0 / np.linalg.norm(dense, axis=0)
+    white = sparse.whitened(inner)
+    np.testing.assert_allclose(white.spread(white.parts) * unit, inner.whitened(dense) * unit, atol=1e-9)
+
+
+def test_a_column_that_is_not_finite_is_refused(dense):
+    columns = dense.copy()
+    columns[3, 1] = np.nan
+    with pytest.raises(ValueError, match="not finite"):
+        InStops.of(columns, STOP)
+
+
+def test_no_rows_have_no_directions():
+    empty = InStops.of(np.zeros((0, 3)), np.zeros(0, dtype=np.int64))
+    assert empty.square.shape == (3, 3)
+    assert empty.whitened(InnerNoise(())).parts.shape == (0, 3)

@@ -141,3 +141,53 @@ def test_what_no_averaged_model_holds_counts_with_its_probability_beside_the_lik
     grown = np.diag(second) / scale**2
     assert grown.max() > 1.3
     np.testing.assert_allclose(np.diag(told.covariance) / scale**2, grown, atol=0.02, rtol=0.02)
+
+
+def test_what_some_models_lack_is_the_part_of_its_probability_that_none_of_them_holds(bench):
+    """Three models of unequal weight, one in noise, with a drift: every sum written down from moments of models."""
+    diagnosis = bench.diagnosis(12, ("gyro_bias_warm_up_y(tau=300 s)=0.05 deg/h",), "recommended")
+    found = diagnosis.found.posterior
+    averages = Averages(found.board, diagnosis.fit.dwell_means)
+    noisy = next(m for m in found.models if m.noise.terms)
+    quiet = [m for m in found.models if not m.noise.terms]
+    held_twice = next(m for m in quiet if len(m.members) > len(quiet[0].members))
+    models = (quiet[0], replace(noisy, probability=quiet[0].probability / 2), replace(held_twice, probability=0.004))
+    weight = np.array([m.probability for m in models])
+    weight /= weight.sum()
+    there = [beside(found.board, m) for m in models]
+    total, held = {}, {}
+    for w, model, odds in zip(weight, models, there, strict=True):
+        for k, p in odds.items():
+            total[k] = total.get(k, 0.0) + w * sum(p.values())
+        for k, _ in model.members:
+            held[k] = held.get(k, 0.0) + w
+    mean, second = 0.0, 0.0
+    for w, model, odds in zip(weight, models, there, strict=True):
+        alone = averages.of_model(model.members, model.noise)
+        for k, p in odds.items():
+            lacks = max(total[k] - held.get(k, 0.0), 0.0)
+            if lacks > 1e-4:
+                for width, q in p.items():
+                    one = averages.of_model(tuple(sorted((*model.members, (k, width)))), model.noise)
+                    apart, share = one.mean - alone.mean, w * q * lacks / total[k]
+                    mean = mean + share * apart
+                    second = second + share * np.diag(one.covariance - alone.covariance + np.outer(apart, apart))
+    assert any(0.0 < held.get(k, 0.0) < total[k] for k in total)
+    assert any(found.candidate(k).effect.bias_drift and total[k] - held.get(k, 0.0) > 1e-4 for k in total)
+    left_out = averages._left_out(models, weight)
+    scale = np.sqrt(np.diag(alone.covariance))
+    scale[scale == 0.0] = 1.0
+    np.testing.assert_allclose(left_out.mean / scale, mean / scale, atol=1e-7)
+    np.testing.assert_allclose(np.diag(left_out.covariance) / scale**2, second / scale**2, atol=1e-7)
+    assert (second / scale**2).max() > 0.01
+
+
+def beside(board, model):
+    """Probability of each candidate of the catalogue beside a model, by width."""
+    near = board.data(model.noise)[1].at(model.members)
+    table = near.gains()
+    table[near.data.prior.own] = -np.inf
+    odds = {}
+    for k, width in zip(*np.nonzero(table > -WINDOW), strict=True):
+        odds.setdefault(int(k), {})[int(width)] = float(np.exp(table[k, width]))
+    return {k: {width: o / (1.0 + sum(own.values())) for width, o in own.items()} for k, own in odds.items()}

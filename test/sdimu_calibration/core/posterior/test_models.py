@@ -211,3 +211,19 @@ def test_a_size_that_another_effect_turns_negative_makes_no_model():
     assert {number for number, _ in max(found, key=found.get)[1]} == {1}
     assert all(len(members) < 2 for _, members in found)
     assert data.at(((0, 0), (1, 0))).score == -np.inf
+
+
+def test_a_member_that_cannot_be_negative_stands_beside_what_leaves_it_positive():
+    rng, known = np.random.default_rng(21), prior(6, positive=np.array([True, True, False, False, False, False]))
+    W = drawn(6, rng)
+    data = data_of(W, 0.2 * W[:, 0] + 3.0 * W[:, 2] + rng.standard_normal(ROWS), known)
+    # Alone it takes up what the third one is.
+    here = data.at(((0, 0),))
+    sizes = here.r[:, None] / (here.c[:, None] + np.array(WIDTHS) ** -2.0)
+    stands, seen = here.stands(sizes), set()
+    for k in range(2, 6):
+        for width in range(len(WIDTHS)):
+            is_one = np.isfinite(data.at((*here.members, (k, width))).score)
+            assert stands[k, width] == is_one
+            seen.add(is_one)
+    assert seen == {True, False}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, search, with_steps
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, in_every_noise, search
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import RANDOM_WALK, TRIADS, NoiseTerm
 
@@ -69,7 +69,7 @@ def test_a_search_that_goes_on_from_one_noise_weighs_all_kinds_in_the_end(search
     on = search(evidence, board.allowed, board.wander, earlier=replace(searched, posterior=one))
     open_ones = {key for key, p in alone.items() if 0.03 < p < 0.9}
     assert any(on.posterior.of_noise(triad, [kind]) == 0.0 for triad, kind in open_ones)
-    ended = with_steps(on).posterior
+    ended = in_every_noise(on).posterior
     for triad, kind in open_ones:
         # A tenth, the bin of a campaign of reliability: effects were looked for in other noises.
         assert ended.of_noise(triad, [kind]) == pytest.approx(alone[triad, kind], abs=0.1), (triad, kind)

@@ -19,7 +19,7 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.search import Search, search, with_steps
+from sdimu_calibration.core.diagnosis.search import Search, in_every_noise, search, with_steps
 from sdimu_calibration.core.diagnosis.unknown_attitude import with_attitude_functions
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
@@ -104,8 +104,9 @@ def searched(request: Request, progress: Progress) -> tuple[Request, Round]:
                 break
         request, ground, within = within, fresh_ground(within, first.fit, first.tried, False), None
         done = run_round(request, ground, False, {}, done)
+    told = done.found if request.wander is None else in_every_noise(done.found)
     # Before the fit: its noise has the intervals that are stated here.
-    done = replace(done, found=with_steps(done.found))
+    done = replace(done, found=with_steps(told))
     fit = in_found_noise(request, _with_chosen(request, done, progress), done.found.noise)
     return request, replace(done, fit=fit)
 

@@ -130,6 +130,23 @@ def search(
     )
 
 
+def in_every_noise(found: Search[E]) -> Search[E]:
+    """Weigh all kinds of noise beside the best effects, and tell what is nearly certain of them.
+
+    Parameters
+    ----------
+    found : Search
+        Of the last round, with noise that is told: a round goes on with the kinds of the one before.
+    """
+    if found.posterior is None or not found.posterior.board.has_noises:
+        return found
+    window = found.posterior.in_every_noise()
+    terms = told_noise(window)
+    if terms == found.noise:
+        return replace(found, posterior=window)
+    return replace(found, posterior=window, noise=terms, evidence=in_noise(window.board, terms))
+
+
 def with_steps(found: Search[E]) -> Search[E]:
     """Say of each effect what it adds to those before it, and of the noise how well its sizes are known.
 
@@ -138,8 +155,6 @@ def with_steps(found: Search[E]) -> Search[E]:
     found : Search
         Of the last round: what it says costs more than what it finds.
     """
-    if found.posterior is not None and found.posterior.board.has_noises:
-        found = replace(found, posterior=found.posterior.in_every_noise())
     problem, chosen = Problem(found.evidence), found.chosen.tolist()
     steps: list[Step] = []
     before = problem.held_out([])

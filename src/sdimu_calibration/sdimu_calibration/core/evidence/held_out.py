@@ -151,10 +151,11 @@ class _Normal:
         A = self.columns.square - W.T @ W + np.diag(self.weight)
         inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
         error = e - W @ (inverse @ (self.d - W.T @ e))
-        S = np.eye(len(e)) + W @ (0.5 * (inverse + inverse.T)) @ W.T
-        root = np.linalg.cholesky(S)
+        X = W @ np.linalg.cholesky(0.5 * (inverse + inverse.T) + 1e-18 * np.diag(np.diag(inverse)))
+        # Not of I + XX' itself: what one of its directions is without all others is lost beside the largest.
+        root = np.linalg.qr(np.vstack([np.eye(len(e)), X.T]))[1].T
         white = np.linalg.solve(root, error)
-        return error, -0.5 * float(white @ white) - float(np.log(np.diag(root)).sum()), np.asarray(root)
+        return error, -0.5 * float(white @ white) - float(np.log(np.abs(np.diag(root))).sum()), np.asarray(root)
 
 
 def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:

@@ -1,8 +1,9 @@
 """Columns of many rows that have few directions in each stop, as signatures of wandering biases have.
 
-What a bias did in an earlier stop shows in the rows of a stop by the attitude and the velocity that it left, nine
-numbers; what it does in the stop itself, by one number a stretch. So the rows of a stop, thousands of them, are a
-combination of some dozens of directions, and what is multiplied, divided and left out are these.
+What a bias did in an earlier stop shows in the rows of a stop by the errors of attitude, velocity and position that it
+left, nine numbers; what it does in the stop itself, by one number a stretch and sensor. So the rows of a stop,
+thousands of them, are a combination of some dozens of directions, and what is multiplied, divided and left out are
+these.
 
 Directions are found by sketches. Source: N. Halko, P. Martinsson, J. Tropp, "Finding structure with randomness", SIAM
 Review 53 (2011), algorithm 4.2.
@@ -21,18 +22,36 @@ from sdimu_calibration.core.evidence.inner_noise import InnerNoise
 from sdimu_calibration.core.side_by_side import side_by_side
 
 _LEAST = 1e-9
-"""Part of a stop in a column, over the whole column (1), below which it is left out: the square of it, which is what
-information loses, is rounding."""
+"""Part of a stop in a column, over the whole column (1), below which it is left out: information loses the square of
+it, an estimate as much of its sigma."""
 _SKETCHED = 48
 """Number of directions (1) that are looked for at a time: a stop of an hour's test has one to three times as many."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which of N rows are of which stop."""
+
+    stop: Ints
+    """Number of the stop that each row belongs to, shape (N,)."""
+
+    @cached_property
+    def stops(self) -> Ints:
+        """Number of each stop, shape (s,)."""
+        return np.unique(self.stop).astype(np.int64)
+
+    @cached_property
+    def rows(self) -> tuple[Ints, ...]:
+        """Rows of each stop, shape (n,) each."""
+        return tuple(np.flatnonzero(self.stop == number) for number in self.stops)
 
 
 @dataclass(frozen=True)
 class InStops:
     """Matrix of N rows and c columns: in each stop, directions times what each column has of them."""
 
-    stop: Ints
-    """Number of the stop that each row belongs to, shape (N,)."""
+    layout: Layout
+    """Which rows are of which stop."""
     directions: tuple[Floats, ...]
     """Of each stop, orthonormal, shape (rows, m); stops in the order of their numbers."""
     parts: Floats
@@ -60,18 +79,18 @@ class InStops:
         stop : ndarray of int, shape (N,)
             Number of the stop that each row belongs to.
         """
-        count = np.unique(stop, return_counts=True)[1]
-        return cls(stop, tuple(np.zeros((n, 0)) for n in count.tolist()), np.zeros((0, 0)))
+        layout = Layout(stop)
+        return cls(layout, tuple(np.zeros((len(rows), 0)) for rows in layout.rows), np.zeros((0, 0)))
 
-    @cached_property
+    @property
     def stops(self) -> Ints:
         """Number of each stop, shape (s,)."""
-        return np.unique(self.stop).astype(np.int64)
+        return self.layout.stops
 
-    @cached_property
-    def rows(self) -> tuple[Bools, ...]:
-        """Rows of each stop, shape (N,) each."""
-        return tuple(self.stop == number for number in self.stops)
+    @property
+    def rows(self) -> tuple[Ints, ...]:
+        """Rows of each stop, shape (n,) each."""
+        return self.layout.rows
 
     @cached_property
     def places(self) -> tuple[slice, ...]:
@@ -92,7 +111,7 @@ class InStops:
         weights : ndarray, shape (c, k)
             Of each column in each combination.
         """
-        return InStops(self.stop, self.directions, self.parts @ weights)
+        return InStops(self.layout, self.directions, self.parts @ weights)
 
     def only(self, columns: Bools) -> InStops:
         """Return some of the columns.
@@ -102,7 +121,7 @@ class InStops:
         columns : ndarray of bool, shape (c,)
             Which.
         """
-        return InStops(self.stop, self.directions, self.parts[:, columns])
+        return InStops(self.layout, self.directions, self.parts[:, columns])
 
     def seen(self, columns: Floats) -> Floats:
         """Say what other columns have of the directions.
@@ -157,7 +176,7 @@ class InStops:
         ndarray, shape (N,) or (N, k)
             In the unit of the parts.
         """
-        out = np.zeros((len(self.stop), *parts.shape[1:]))
+        out = np.zeros((len(self.layout.stop), *parts.shape[1:]))
         for rows, Q, place in zip(self.rows, self.directions, self.places, strict=True):
             out[rows] = Q @ parts[place]
         return out
@@ -169,11 +188,18 @@ class InStops:
         ----------
         columns : ndarray, shape (N, k)
             In any units.
+
+        Raises
+        ------
+        ValueError
+            Of a column that is not finite.
         """
         length = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+        if not np.isfinite(length).all():
+            raise ValueError("a column of signatures is not finite")
         unit = 1.0 / np.where(length > 0.0, length, 1.0)
 
-        def extended(known: tuple[Bools, Floats]) -> tuple[Floats, Floats]:
+        def extended(known: tuple[Ints, Floats]) -> tuple[Floats, Floats]:
             own = columns[known[0]]
             Q = _more(known[1], own, unit)
             return Q, Q.T @ own
@@ -181,23 +207,19 @@ class InStops:
         found = side_by_side(extended, zip(self.rows, self.directions, strict=True))
         old = [self.parts[place] for place in self.places]
         c = self.parts.shape[1]
-        parts = [np.zeros((Q.shape[1], c + columns.shape[1])) for Q, _ in found]
+        width = c + columns.shape[1]
+        parts = [np.zeros((Q.shape[1], width)) for Q, _ in found]
         for part, mine, (_, new) in zip(parts, old, found, strict=True):
             part[: len(mine), :c], part[:, c:] = mine, new
-        return InStops(self.stop, tuple(Q for Q, _ in found), np.vstack(parts))
+        return InStops(self.layout, tuple(Q for Q, _ in found), np.vstack([np.zeros((0, width)), *parts]))
 
     def whitened(self, inner: InnerNoise) -> InStops:
-        """Whiten in noise that moves within stretches.
-
-        Raises
-        ------
-        ValueError
-            Where a stretch has rows of two stops: what it mixes then has directions of both.
-        """
-        if any(self.stop[part.rows.start] != self.stop[part.rows.stop - 1] for part in inner.parts):
-            raise ValueError("a stretch in which rows are whitened lies in one stop")
-        widest = max(Q.shape[1] for Q in self.directions)
-        every = np.zeros((len(self.stop), widest))
+        """Whiten in noise that moves within stretches."""
+        stop = self.layout.stop
+        if any(stop[part.rows.start] != stop[part.rows.stop - 1] for part in inner.parts):
+            # A rest that two stops share: what it mixes has directions of both.
+            return InStops.of(inner.whitened(self.spread(self.parts)), stop)
+        every = np.zeros((len(stop), max((Q.shape[1] for Q in self.directions), default=0)))
         for rows, Q in zip(self.rows, self.directions, strict=True):
             every[rows, : Q.shape[1]] = Q
         white = inner.whitened(every)
@@ -206,7 +228,7 @@ class InStops:
             turned, R = np.linalg.qr(white[rows, : Q.shape[1]])
             directions.append(turned)
             parts[place] = R @ self.parts[place]
-        return InStops(self.stop, tuple(directions), parts)
+        return InStops(self.layout, tuple(directions), parts)
 
 
 def _more(known: Floats, columns: Floats, unit: Floats) -> Floats:

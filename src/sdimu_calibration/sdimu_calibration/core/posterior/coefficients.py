@@ -41,10 +41,8 @@ _BESIDE = 40
 """Number of models (1) beside which the probability of what no averaged model holds is taken: the likeliest, which are
 nearly alike in what they lack."""
 _LEAST_LACKING = 1e-4
-"""Probability (1) of a candidate that the averaged models lack, below which it is left out: it moves no sigma by a part
-in a hundred unless it stands ten sigma out."""
-_LARGEST_GAIN = 100.0
-"""Log posterior (1) of a candidate beside a model from which it is certain: beyond, its odds are no number."""
+"""Probability (1) of a candidate that the averaged models lack, below which it is left out: a tenth of the least of a
+model in a window."""
 _IS_THE_CAUSE = 0.5
 """Probability (1) that an equation that no physics names moves the coefficients as its cause does: nothing in the data
 says so, nothing speaks against it."""
@@ -85,12 +83,17 @@ class _Beside:
 
     @classmethod
     def of(cls, near: Expansion) -> _Beside:
-        """Work it out in closed form, of what is within the window of the model."""
-        gains = near.gains()
-        odds = np.where(gains > -WINDOW, np.exp(np.minimum(gains, _LARGEST_GAIN)), 0.0)
-        odds[near.columns] = 0.0
+        """Work it out in closed form, of what is less than the window behind the model.
+
+        Equations that no physics names are left out: what they add to the coefficients nobody knows.
+        """
         variance = 1.0 / (near.c[:, None] + np.array(WIDTHS) ** -2.0)
-        return cls(odds / (1.0 + odds.sum(axis=1, keepdims=True)), near.r[:, None] * variance, variance)
+        size = near.r[:, None] * variance
+        gains = np.where(near.data.prior.own[:, None] | ~near.stands(size), -np.inf, near.gains())
+        # Of the likelier of being there and not: the other one's odds are no number where it is certain.
+        top = np.maximum(gains.max(axis=1, keepdims=True), 0.0)
+        odds = np.where(gains > -WINDOW, np.exp(gains - top), 0.0)
+        return cls(odds / (np.exp(-top) + odds.sum(axis=1, keepdims=True)), size, variance)
 
     def moments(self, some: Ints) -> tuple[Floats, Floats]:
         """First and second moment of the sizes of some candidates, zero where they are not there; (1), shape (k,)."""

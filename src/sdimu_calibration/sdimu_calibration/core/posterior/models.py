@@ -111,6 +111,23 @@ class Expansion:
         """
         return gains(self.c, self.r, self.data.prior.positive) + self.data.prior.log_more(self.columns)[:, None]
 
+    def stands(self, sizes: Floats) -> Bools:
+        """Whether members that cannot be negative stay so beside each candidate.
+
+        Parameters
+        ----------
+        sizes : ndarray, shape (q, widths)
+            Of the candidates, in units of their prior sizes.
+
+        Returns
+        -------
+        ndarray of bool, shape (q, widths)
+        """
+        out = np.ones(sizes.shape, dtype=bool)
+        for place in np.flatnonzero(self.data.prior.positive[self.columns]).tolist():
+            out &= self._m[place] - self._V[:, place, None] * sizes >= 0.0
+        return out
+
     def drops(self) -> Floats:
         """Log posterior that the model gains without each of its members.
 
