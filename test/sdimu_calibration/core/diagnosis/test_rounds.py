@@ -66,6 +66,7 @@ def play(monkeypatch):
         monkeypatch.setattr(rounds, "extended", lambda *_: None)
         monkeypatch.setattr(rounds, "with_attitude_functions", lambda request, _found: request)
         monkeypatch.setattr(rounds, "with_steps", lambda found: found)
+        monkeypatch.setattr(rounds, "in_every_noise", lambda found: found)
         monkeypatch.setattr(rounds, "_with_chosen", lambda *_: None)
         monkeypatch.setattr(rounds, "in_found_noise", lambda *_: None)
         request, done = rounds.searched(Request(), lambda *_: None)

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bare_prior import prior
 
 from sdimu_calibration.core.posterior import coefficients
-from sdimu_calibration.core.posterior.coefficients import Averages
+from sdimu_calibration.core.posterior.coefficients import Averages, _Beside
+from sdimu_calibration.core.posterior.models import Data
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW
 
@@ -191,3 +193,15 @@ def beside(board, model):
     for k, width in zip(*np.nonzero(table > -WINDOW), strict=True):
         odds.setdefault(int(k), {})[int(width)] = float(np.exp(table[k, width]))
     return {k: {width: o / (1.0 + sum(own.values())) for width, o in own.items()} for k, own in odds.items()}
+
+
+def test_an_equation_that_no_physics_names_is_not_counted_beside_a_model():
+    rng = np.random.default_rng(3)
+    W = rng.standard_normal((40, 4))
+    own = np.array([False, True, False, False])
+    data = Data(W.T @ W, W.T @ (2.0 * W[:, :2].sum(axis=1) + rng.standard_normal(40)), prior(4, own=own))
+    found = _Beside.of(data.at(((2, 0),)))
+    assert data.at(((2, 0),)).gains()[1].max() > 0.0
+    assert found.probability[1].sum() == 0.0
+    assert found.probability[2].sum() == 0.0
+    assert found.probability[0].sum() > 0.9
