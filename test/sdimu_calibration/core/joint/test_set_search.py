@@ -18,6 +18,7 @@ from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
+from sdimu_calibration.core.posterior import coefficients
 from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.probability import in_percent
@@ -103,8 +104,10 @@ def test_the_told_model_has_the_sigmas_of_its_fit(both):
     assert (ratio[scatters] < 0.95).all()
 
 
-def test_over_the_told_model_alone_coefficients_are_those_of_its_fit(both):
+def test_over_the_told_model_alone_coefficients_are_those_of_its_fit(both, monkeypatch):
     """The window takes what was told as candidates, drifts in the mean over the dwells, and comes back to the fit."""
+    # Without what a window of one model lacks.
+    monkeypatch.setattr(coefficients, "_LEAST_LACKING", 1.0)
     fit, window = both.after, both.posterior
     noise = window.board.noise_of(fit, window.told.noise)
     told = replace(window.models[0], members=window.told.members, noise=noise, probability=1.0)
