@@ -38,7 +38,9 @@ def normal_of(W, e, weight, shift, rows):
 @pytest.mark.parametrize("number", [1, 8, 24, 25, 30, 34])
 def test_rows_left_out_are_predicted_from_the_others(fitted, number, monkeypatch):
     rows = np.arange(10, 10 + number)
-    of_all = normal_of(*fitted, rows).without(1)
+    normal = normal_of(*fitted, rows)
+    assert normal._of_fit_to_all(1) is not None
+    of_all = normal.without(1)
     monkeypatch.setattr(_Normal, "_of_fit_to_all", lambda *_: None)
     anew = normal_of(*fitted, rows).without(1)
     for told in (of_all, anew):

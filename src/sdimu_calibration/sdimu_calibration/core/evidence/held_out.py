@@ -112,8 +112,7 @@ class _Normal:
             return rest, -0.5 * float(rest @ rest), np.ones(len(rest))
         error, score, root = self._of_fit_to_all(k) or self._anew(k)
         # Beside its directions a row has the unit variance of white noise.
-        beside = 1.0 - np.einsum("ij,ij->i", Q, Q)
-        spread = beside + np.einsum("ij,ij->i", Q @ root, Q @ root)
+        spread = 1.0 - np.sum(Q**2, axis=1) + np.sum((Q @ root) ** 2, axis=1)
         return rest + Q @ error, score - 0.5 * float(rest @ rest), spread
 
     def _of_fit_to_all(self, k: int) -> tuple[Floats, float, Floats] | None:

@@ -227,15 +227,17 @@ class Averages:
         q, held = self.board.evidence.coefficients, np.zeros(len(self.board.use))
         for model, w in zip(models, weight.tolist(), strict=True):
             held[[k for k, _ in model.members]] += w
-        likely = weight[:_BESIDE] / weight[:_BESIDE].sum()
-        beside = [_Beside.of(self.board.data(m.noise)[1].at(m.members)) for m in models[:_BESIDE]]
+        models, likely = models[:_BESIDE], weight[:_BESIDE] / weight[:_BESIDE].sum()
+        beside = [_Beside.of(self.board.data(m.noise)[1].at(m.members)) for m in models]
         probability = np.array([w * one.probability.sum(axis=1) for w, one in zip(likely, beside, strict=True)])
         total = probability.sum(axis=0)
         lacks = np.maximum(total - held, 0.0)
         some = np.flatnonzero(lacks > _LEAST_LACKING)
         share = lacks[some] / total[some]
         mean, covariance = np.zeros(q), np.zeros((q, q))
-        for model, w, one in zip(models, likely.tolist(), beside, strict=False):
+        if not len(some):
+            return Moments(mean, covariance)
+        for model, w, one in zip(models, likely.tolist(), beside, strict=True):
             moved = self._moved_by(some, model) * self.board.size[some]
             first, second = one.moments(some)
             mean += w * moved @ (share * first)
@@ -250,7 +252,7 @@ class Averages:
         out = -self._coefficients(model.members, model.noise) @ (covariance @ J[np.ix_(at, columns)])
         for channel, row in self._biases.items():
             out[row] -= self._mean(model.noise).moved[channel, columns]
-        return np.asarray(out + np.column_stack([self._shift(k) for k in some.tolist()] or [out]))
+        return np.asarray(out + np.column_stack([self._shift(k) for k in some.tolist()]))
 
     def _shift(self, number: int) -> Floats:
         """Mean over the dwells that a candidate adds to each of q coefficients, per unit; shape (q,)."""
