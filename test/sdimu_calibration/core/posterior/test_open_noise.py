@@ -71,6 +71,16 @@ def test_a_search_that_goes_on_from_one_noise_weighs_all_kinds_in_the_end(search
     assert any(on.posterior.of_noise(triad, [kind]) == 0.0 for triad, kind in open_ones)
     ended = in_every_noise(on).posterior
     for triad, kind in open_ones:
-        # A tenth, the bin of a campaign of reliability: effects were looked for in other noises.
-        assert ended.of_noise(triad, [kind]) == pytest.approx(alone[triad, kind], abs=0.1), (triad, kind)
+        assert ended.of_noise(triad, [kind]) == pytest.approx(alone[triad, kind], abs=0.05), (triad, kind)
     assert sum(p for _, p in ended.noises) == pytest.approx(1.0)
+
+
+def test_a_noise_in_two_sizes_counts_once_beside_each_set_of_effects(searched):
+    """A search from one noise looks at it in the size that it has beside no other, too."""
+    window = searched.posterior
+    one = replace(window, noises=window.noises[:1])
+    on = search(searched.white, window.board.allowed, window.board.wander, earlier=replace(searched, posterior=one))
+    held = [(model.noise.key, model.members) for model in on.posterior.models]
+    assert len(set(held)) == len(held)
+    # Both sizes were looked at: beside other effects the other one is the likelier.
+    assert len({model.noise for model in on.posterior.models}) > len({key for key, _ in held})

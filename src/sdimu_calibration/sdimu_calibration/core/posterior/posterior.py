@@ -367,23 +367,34 @@ def _noises(
     weight: dict[NoiseModel, float] = {}
     for model in models:
         weight[model.noise] = weight.get(model.noise, 0.0) + model.probability
-    kinds = {noise.key for noise in weight}
+    of_kinds: dict[frozenset[Hashable], float] = {}
+    for noise, w in weight.items():
+        of_kinds[noise.key] = of_kinds.get(noise.key, 0.0) + w
     score = {noise.key: score for score, noise in reversed(beside)}
     known = [noise for noise in weight if noise.key in score]
     out = dict(weight)
     for _, noise in beside:
-        if noise.key not in kinds and known:
+        if noise.key not in of_kinds and known:
             # Beside no noise in a triad effects stand in its place.
             like = min(
                 known, key=lambda one: (len(one.triads ^ noise.triads), len(one.key ^ noise.key), -score[one.key])
             )
-            out[noise] = weight[like] * float(np.exp(score[noise.key] - score[like.key]))
+            out[noise] = of_kinds[like.key] * float(np.exp(score[noise.key] - score[like.key]))
     total = sum(out.values())
     return tuple(sorted(((noise, w / total) for noise, w in out.items()), key=lambda one: -one[1]))
 
 
 def _weighed(found: dict[tuple[int, Members], float], noises: Sequence[NoiseModel]) -> tuple[Weighed, ...]:
-    ranked = sorted(found.items(), key=lambda item: (-item[1], item[0]))
+    """Weigh models, the likeliest first.
+
+    The prior of a noise holds the share of all its sizes: in two sizes it counts once beside each set of effects, in
+    the likelier one.
+    """
+    once: dict[tuple[frozenset[Hashable], Members], tuple[tuple[int, Members], float]] = {}
+    for item in sorted(found.items(), key=lambda item: (-item[1], item[0])):
+        (k, members), _ = item
+        once.setdefault((noises[k].key, members), item)
+    ranked = list(once.values())
     weight = np.exp(np.array([score for _, score in ranked]) - ranked[0][1])
     share = (weight / weight.sum()).tolist()
     return tuple(Weighed(m, noises[k], p) for ((k, m), _), p in zip(ranked, share, strict=True))
