@@ -26,7 +26,7 @@ class Joint:
     """q columns."""
     wander: Wander
     """m signatures."""
-    across: Floats
+    known: Floats
     """Information across the first n columns of the evidence and the wander, where it is known, shape (n, m)."""
 
     @classmethod
@@ -34,17 +34,51 @@ class Joint:
         """Put evidence and wander together; `earlier` is of the same signatures, or of the first ones of them."""
         if earlier is None:
             return cls(evidence, wander, np.zeros((0, wander.U.parts.shape[1])))
-        known = earlier.information.J[: len(earlier.evidence.names), len(earlier.evidence.names) :]
-        return cls(evidence, wander, known)
+        return cls(evidence, wander, earlier.across)
 
     @cached_property
-    def information(self) -> Information:
-        """Information on the columns of the evidence, then on the wander, in white noise."""
-        W, U, e = self.evidence.W, self.wander.U, self.evidence.e
-        own, n = self.evidence.information, len(self.across)
-        across = np.vstack([self.across, U.across(W[:, n:])])
-        J = np.block([[own.J, across], [across.T, U.square]])
-        return Information(J, np.concatenate([own.d, U.across(e[:, None])[0]]))
+    def across(self) -> Floats:
+        """Information across the q columns of the evidence and the wander in white noise.
+
+        Returns
+        -------
+        ndarray, shape (q, m)
+            Inverse units (SI) of both.
+        """
+        return np.vstack([self.known, self.wander.U.across(self.evidence.W[:, len(self.known) :])])
+
+    @cached_property
+    def pull(self) -> Floats:
+        """Information vector of the wander in white noise, shape (m,); in its inverse units (SI)."""
+        return np.asarray(self.wander.U.across(self.evidence.e[:, None])[0])
+
+    def folded(self, terms: Sequence[NoiseTerm]) -> tuple[Floats, Floats]:
+        """Information on the modes of a noise, as `folded` makes it.
+
+        Returns
+        -------
+        M : ndarray, shape (r, r)
+            With what is known before the data (1).
+        y : ndarray, shape (r,)
+            (1).
+        """
+        M, y, _ = folded(self.wander.U.square, self.pull, terms, self.wander.cut)
+        return M, y
+
+    def spread(self, terms: Sequence[NoiseTerm], columns: Ints | slice = slice(None)) -> Floats:
+        """Information across columns of the evidence and the modes of a noise, as `spread` makes it.
+
+        Parameters
+        ----------
+        columns : ndarray of int, shape (k,), optional
+            Of the evidence; all of them without.
+
+        Returns
+        -------
+        ndarray, shape (k, r)
+            Inverse units (SI) of the columns.
+        """
+        return spread(self.across[columns], terms, self.wander.cut)
 
     def on_wander(self, known: Ints, weight: Floats) -> NoiseInformation:
         """Information on the wandering biases with some parameters estimated along.
@@ -56,16 +90,13 @@ class Joint:
         weight : ndarray, shape (k,)
             Prior information of each (inverse square of its unit, SI).
         """
-        full, q = self.information, len(self.evidence.names)
-        B, d = full.J[known, q:], full.d[known]
-        X = solved(full.J[np.ix_(known, known)] + np.diag(weight), np.column_stack([B, d]))
-        J = full.J[q:, q:] - B.T @ X[:, :-1]
-        return NoiseInformation(0.5 * (J + J.T), full.d[q:] - B.T @ X[:, -1], 0.5 * float(d @ X[:, -1]))
+        own = self.evidence.information
+        B, d = self.across[known], own.d[known]
+        X = solved(own.J[np.ix_(known, known)] + np.diag(weight), np.column_stack([B, d]))
+        J = self.wander.U.square - B.T @ X[:, :-1]
+        return NoiseInformation(0.5 * (J + J.T), self.pull - B.T @ X[:, -1], 0.5 * float(d @ X[:, -1]))
 
     def in_noise(self, terms: Sequence[NoiseTerm]) -> Information:
         """Information on the columns of the evidence in noise of these terms."""
-        q, full = len(self.evidence.names), self.information
-        B = spread(full.J[:q, q:], terms, self.wander.cut)
-        M, y, _ = folded(full.J[q:, q:], full.d[q:], terms, self.wander.cut)
-        modes = taken(M, y, B)
-        return Information(full.J[:q, :q] - modes.J, full.d[:q] - modes.d)
+        own, modes = self.evidence.information, taken(*self.folded(terms), self.spread(terms))
+        return Information(own.J - modes.J, own.d - modes.d)

@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.conditions import Conditions
+from sdimu_calibration.core.evidence.grown import NOT_GROWN, Grown, chosen
 from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
@@ -67,6 +68,8 @@ class LinearEvidence(ABC):
     """How many of the model's parameters, the first ones, are sensor coefficients."""
     noise: InStops | None = field(default=None, kw_only=True)
     """Signatures of the modes of noise with a memory, N rows and r columns; None without any."""
+    grown: Grown = field(default=NOT_GROWN, kw_only=True, repr=False, compare=False)
+    """Memory of W, with room for more columns."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
     """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
@@ -204,7 +207,8 @@ class LinearEvidence(ABC):
         more, prior = candidate_priors(effects, self.imu)
         W = self.signature(effects) if signature is None else signature
         # Only what is new is multiplied: the old columns are many.
-        weighed, every, old = self.weighed(W), np.hstack([self.W, W]), self.information
+        weighed, grown, old = self.weighed(W), self.grown.beside(self.W, W), self.information
+        every = grown.columns
         q = len(old.d)
         J = np.empty((every.shape[1], every.shape[1]))
         J[:q, :q] = old.J
@@ -218,6 +222,7 @@ class LinearEvidence(ABC):
         return replace(
             self,
             W=every,
+            grown=grown,
             names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
             prior=np.concatenate([self.prior, prior]),
@@ -242,7 +247,7 @@ class LinearEvidence(ABC):
         full = self.information
         return replace(
             self,
-            W=self.W[:, : len(keep)] if whole else self.W[:, keep],
+            W=self.W[:, : len(keep)] if whole else chosen(self.W, keep),
             names=tuple(self.names[i] for i in keep),
             candidates=tuple(self.candidate(i) for i in columns),
             prior=self.prior[columns - p],
@@ -308,7 +313,7 @@ class LinearEvidence(ABC):
         return replace(
             self,
             e=self.e - self.W[:, columns] @ self.shift[columns],
-            W=np.ascontiguousarray(self.W[:, order]),
+            W=chosen(self.W, order),
             names=(*(self.names[i] for i in stays), *(c.label for c in tried), *self.names[p:]),
             weight=self.weight[stays],
             shift=self.shift[stays],

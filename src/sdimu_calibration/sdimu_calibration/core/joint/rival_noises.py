@@ -15,7 +15,6 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.noise_root import folded
 from sdimu_calibration.core.evidence.taken import taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
@@ -124,7 +123,6 @@ def _taken(joint: Joint, noise: NoiseModel) -> tuple[float, float]:
     """Log determinant of a noise over white noise, and the sum of squares that it takes at the calibration (1)."""
     if not noise.terms:
         return 0.0, 0.0
-    q, full = len(joint.evidence.names), joint.information
-    M, y, _ = folded(full.J[q:, q:], full.d[q:], noise.terms, joint.wander.cut)
+    M, y = joint.folded(noise.terms)
     modes = taken(M, y, np.zeros((0, len(y))))
     return 2.0 * float(np.log(np.diag(modes.L)).sum()), float(modes.z @ modes.z)

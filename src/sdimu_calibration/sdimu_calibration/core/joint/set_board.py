@@ -51,7 +51,7 @@ class SetNoise(NoiseModel):
         """Log of the odds beside white noise in all recordings, of the share of the sizes too (1)."""
         return self.log_prior_of_all
 
-    @property
+    @cached_property
     def sizes(self) -> Mapping[Hashable, float]:
         """Size of each term (SI), by its recording and what it is."""
         return {(k, t.identity): t.size for k, noise in enumerate(self.own) for t in noise.terms}

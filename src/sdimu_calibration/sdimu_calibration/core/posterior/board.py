@@ -16,7 +16,7 @@ from sdimu_calibration.core.evidence.candidate import of_the_sensor
 from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E
-from sdimu_calibration.core.evidence.noise_root import folded, root_of, spread
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken, taken
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.evidence.wander import Wander
@@ -216,11 +216,8 @@ class Board(Generic[E]):
         J, d = full.J[np.ix_(keep, keep)], full.d[keep]
         if not noise.terms or self.joint is None or self.wander is None:
             return InNoise(J, d, np.zeros((0, 0)), nothing_taken(len(keep)))
-        joint, n = self.joint.information, len(self.evidence.names)
-        cut = self.wander.cut
-        M, y, _ = folded(joint.J[n:, n:], joint.d[n:], noise.terms, cut)
-        modes = taken(M, y, spread(joint.J[keep, n:], noise.terms, cut))
-        return InNoise(J - modes.J, d - modes.d, root_of(noise.terms, cut), modes)
+        modes = taken(*self.joint.folded(noise.terms), self.joint.spread(noise.terms, keep))
+        return InNoise(J - modes.J, d - modes.d, root_of(noise.terms, self.wander.cut), modes)
 
     def data(self, noise: NoiseModel) -> tuple[float, Data]:
         """Log posterior of no effect in a noise, over that in white noise; and the candidates in it."""

@@ -11,6 +11,7 @@ one.
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -255,4 +256,5 @@ def gains(c: Floats, r: Floats, positive: Bools) -> Floats:
 
 
 def _with(members: Members, column: int, width: int) -> Members:
-    return tuple(sorted((*members, (column, width))))
+    place = bisect(members, (column, width))
+    return (*members[:place], (column, width), *members[place:])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, combinations, product, repeat
 
 import numpy as np
@@ -105,17 +106,17 @@ class NoiseModel:
         """Log of its odds beside white noise, of the share of its sizes too (1)."""
         return sum(self.shares)
 
-    @property
+    @cached_property
     def sizes(self) -> Mapping[Hashable, float]:
         """Size of each term (SI), by what it is."""
         return {t.identity: t.size for t in self.terms}
 
-    @property
+    @cached_property
     def key(self) -> frozenset[Hashable]:
         """What each term is and where, its size aside."""
         return frozenset(self.sizes)
 
-    @property
+    @cached_property
     def kinds(self) -> frozenset[Identity]:
         """What each term is, its size aside."""
         return frozenset(t.identity for t in self.terms)

@@ -157,4 +157,4 @@ def _holds(data: Data, members: Members) -> bool:
     What enters a model may turn the sign of what is in it already; the closed form of the neighbours does not see that.
     """
     of_one_sign = data.prior.of_one_sign
-    return not any(number in of_one_sign for number, _ in members) or bool(np.isfinite(data.at(members).score))
+    return of_one_sign.isdisjoint([number for number, _ in members]) or bool(np.isfinite(data.at(members).score))
