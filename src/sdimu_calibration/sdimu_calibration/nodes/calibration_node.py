@@ -75,7 +75,6 @@ DIAGNOSIS_S = 120.0
 REPORT_S = 900.0
 """Time (s) after the result for which its files are awaited: the diagnosis is made twice, the second time in full."""
 GRAVITY = 9.8
-_MODEL = "model to estimate: name in config/model or path; empty: baseline (handheld: hand)"
 _NEARLY_NS = 1_000
 """A status this much before the last sample is the one that belongs to it (ns)."""
 

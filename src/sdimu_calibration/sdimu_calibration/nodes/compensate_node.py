@@ -29,8 +29,7 @@ from sdimu_calibration.core.compensation import Compensator, compensate, compens
 from sdimu_calibration.core.data.recent_log import RecentLog
 from sdimu_calibration.core.data.stray_stamps import Block, StampSieve, stray_note
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, TemperatureLog
-from sdimu_calibration.nodes.convert import NS
-from sdimu_calibration.nodes.credits import Consumer, Producer, to_ns
+from sdimu_calibration.nodes.credits import NS, Consumer, Producer, to_ns
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node

@@ -55,6 +55,12 @@ def to_ns(stamp: Any) -> int:
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
+def stamp_of(message: bytes) -> int:
+    """Stamp (ns) of the header with which a little-endian CDR message begins."""
+    sec = int.from_bytes(message[4:8], "little", signed=True)
+    return sec * NS + int.from_bytes(message[8:12], "little")
+
+
 def header(stamp_ns: int, frame_id: str = "") -> Header:
     """Return a std_msgs/Header of a stamp in nanoseconds."""
     message = Header(frame_id=frame_id)

@@ -7,6 +7,7 @@ second. The recorder grants credits like any consumer and leaves when the stream
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from importlib import import_module
@@ -16,8 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.nodes.convert import stamp_in_label, stamp_of
-from sdimu_calibration.nodes.credits import Consumer
+from sdimu_calibration.nodes.credits import Consumer, stamp_of
 from sdimu_calibration.nodes.heartbeat import MARK
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.parameters import Declare
@@ -55,6 +55,7 @@ STREAMS = ("imu/data_raw", "rate_table/status", "calibration/coefficients")
 FLUSH_S = 0.25
 QUIET_S = 0.4
 PEERS_PATIENCE_S = 5.0
+_STAMP_LABEL = re.compile(rb"stamp_ns=(-?\d+)")
 
 
 class RecorderNode:
@@ -137,6 +138,12 @@ class RecorderNode:
     def _complete(self) -> bool:
         first, *others = self._consumers.values()
         return first.ended and all(c.ended or not self.node.count_publishers(c.topic) for c in others)
+
+
+def stamp_in_label(message: bytes) -> int:
+    """Stamp (ns) in the label ``stamp_ns=...`` of a CDR multi-array; 0 without one."""
+    found = _STAMP_LABEL.search(message)
+    return int(found.group(1)) if found else 0
 
 
 def message_class(type_name: str) -> type:

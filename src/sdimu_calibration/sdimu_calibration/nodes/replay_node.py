@@ -19,8 +19,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState, Temperature
 
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
-from sdimu_calibration.nodes.convert import NS, stamp_of
-from sdimu_calibration.nodes.credits import HISTORY, STREAM, Producer, publish
+from sdimu_calibration.nodes.credits import HISTORY, NS, STREAM, Producer, publish, stamp_of
 from sdimu_calibration.nodes.parameters import Declare
 from sdimu_calibration.nodes.spinning import run_node
 from sdimu_calibration.nodes.ticking import Ticker

@@ -19,7 +19,7 @@ from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale
 from sdimu_calibration.storage.importing.columns import Pair, changes, pairs_by_heading, sensors_by_heading
 from sdimu_calibration.storage.importing.import_map import ISO
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file, column_text
-from sdimu_calibration.storage.importing.time_column import TimeColumn, time_of
+from sdimu_calibration.storage.importing.time_column import Table, TimeColumn, time_of
 from sdimu_calibration.storage.importing.unnamed_columns import pairs_by_numbers
 
 _UNKNOWN_HZ = 100.0
@@ -72,12 +72,12 @@ _PAGE = "doc/recordings.md, Import"
 _WRITE = f"write a map ({_PAGE}) and name it by --map"
 
 
-def _shown(table: TextTable | ArrayColumns) -> str:
+def _shown(table: Table) -> str:
     """Name what the user has to choose from."""
     return ", ".join(table.headings[:12]) if isinstance(table, TextTable) else table.contents
 
 
-def _table(path: Path) -> TextTable | ArrayColumns:
+def _table(path: Path) -> Table:
     """Open a file as a table of columns."""
     kind = path.suffix.lower()
     arrays = read_npz(path) if kind == ".npz" else read_mat(path) if kind == ".mat" else None
@@ -91,7 +91,7 @@ def _table(path: Path) -> TextTable | ArrayColumns:
     return table
 
 
-def _time(table: TextTable | ArrayColumns, numbers: Floats, pair: Pair, taken: Sequence[int]) -> TimeColumn:
+def _time(table: Table, numbers: Floats, pair: Pair, taken: Sequence[int]) -> TimeColumn:
     """Find the clock of the gyros: a timetable says it itself."""
     clock = _clock(table, pair.gyro[0])
     if not clock or isinstance(table, TextTable):
@@ -101,12 +101,12 @@ def _time(table: TextTable | ArrayColumns, numbers: Floats, pair: Pair, taken: S
     return TimeColumn(clock, ISO if dates else "s", rate_hz, why)
 
 
-def _clock(table: TextTable | ArrayColumns, column: int) -> str:
+def _clock(table: Table, column: int) -> str:
     """Name the times that a timetable gives a column, from 0; empty where there are none."""
     return "" if isinstance(table, TextTable) else table.clock_of(column)
 
 
-def _pairs(table: TextTable | ArrayColumns, numbers: Floats) -> tuple[list[Pair], str]:
+def _pairs(table: Table, numbers: Floats) -> tuple[list[Pair], str]:
     """Find the sensors, and say by what."""
     accel, gyro = sensors_by_heading(table.headings)
     try:
@@ -129,7 +129,7 @@ def _suffixes(names: Sequence[str]) -> list[str]:
 
 
 def _proposal(
-    table: TextTable | ArrayColumns, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]
+    table: Table, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]
 ) -> Proposal:
     by, suffix = found
     path = table.path
@@ -166,7 +166,7 @@ def _proposal(
     return Proposal(suffix, "\n".join(lines) + "\n", tuple(words))
 
 
-def _doubts(table: TextTable | ArrayColumns, numbers: Floats, columns: Sequence[int]) -> list[str]:
+def _doubts(table: Table, numbers: Floats, columns: Sequence[int]) -> list[str]:
     """Say what speaks against six columns; refuse those that hold hardly a number."""
     six, names = numbers[:, list(columns)], [table.name_of(k) for k in columns]
     without = int(np.count_nonzero(~np.isfinite(six).all(axis=1)))

@@ -9,9 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.storage.importing.array_columns import ArrayColumns
 from sdimu_calibration.storage.importing.import_stamps import is_date
-from sdimu_calibration.storage.importing.table_view import TableView
-from sdimu_calibration.storage.importing.text_table import column_text
+from sdimu_calibration.storage.importing.text_table import TextTable, column_text
+
+Table = TextTable | ArrayColumns
+"""What a map is proposed for: columns of a text file, or of a file of arrays."""
 
 _TIME = re.compile(r"(time|timestamp|stamp|t|sec|secs|seconds|epoch|clock|date|datetime|gps|tow)s?")
 _COUNTER = re.compile(r"(n_?)?(samples?|count(er)?|index|idx|frame|seq|packet|no|n|#)")
@@ -52,7 +55,7 @@ class TimeColumn(NamedTuple):
         return f"{{column: {column_text(self.column)}, unit: {self.unit}}}"
 
 
-def time_of(table: TableView, numbers: Floats, taken: Sequence[int] = ()) -> TimeColumn:
+def time_of(table: Table, numbers: Floats, taken: Sequence[int] = ()) -> TimeColumn:
     """Find the column of times, or the rate that the lines above the data state.
 
     Parameters
@@ -99,7 +102,7 @@ def _steps(values: Floats) -> tuple[Floats, float]:
     return step, float(np.median(step)) if len(step) else 0.0
 
 
-def _clock(table: TableView, k: int, values: Floats) -> TimeColumn | None:
+def _clock(table: Table, k: int, values: Floats) -> TimeColumn | None:
     """Read a column, from 0, as a clock; None where it is none."""
     column = table.name_of(k)
     if not np.isfinite(values).any():
