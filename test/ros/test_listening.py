@@ -15,8 +15,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from sensor_msgs.msg import Imu
 
-from sdimu_calibration.nodes.credits import stamp_of
-from sdimu_calibration.nodes.credits import STREAM
+from sdimu_calibration.nodes.credits import STREAM, stamp_of
 from sdimu_calibration.nodes.listening import Listener
 from sdimu_calibration.nodes.ticking import Ticker
 from sdimu_calibration.storage.bags.cdr import encode_imu

@@ -193,7 +193,7 @@ def test_a_bag_that_changes_in_place_is_another_one(bags, tmp_path):
 def test_workers_end_with_the_process_that_started_them():
     code = (
         "import os, time\nfrom concurrent.futures import ProcessPoolExecutor\n"
-        "from multiprocessing import get_context\nfrom sdimu_calibration.storage.parent import end_with\n"
+        "from multiprocessing import get_context\nfrom sdimu_calibration.storage.set_work import end_with\n"
         "if __name__ == '__main__':\n"
         "    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=end_with, initargs=(os.getpid(),))\n"
         "    print(pool.submit(os.getpid).result(), flush=True)\n"

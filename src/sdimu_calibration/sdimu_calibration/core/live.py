@@ -15,13 +15,12 @@ import numpy as np
 from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.data.arrival import RawTest, in_order, of_the_test
+from sdimu_calibration.core.data.arrival import KeptTest, RawTest, in_order, of_the_test
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
 from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
-from sdimu_calibration.core.data.kept_test import KeptTest
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.data.stray_stamps import StampSieve, stray_note
 from sdimu_calibration.core.data.streams import one_stream

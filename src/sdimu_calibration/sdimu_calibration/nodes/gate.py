@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sdimu_calibration.core.data.stray_stamps import NEVER
-from sdimu_calibration.core.data.strays import FAR_NS
+from sdimu_calibration.core.data.stray_stamps import FAR_NS, NEVER
 
 LAPSE_DATA_NS = 10_000_000_000
 OTHER_CLOCK_NS = 60_000_000_000

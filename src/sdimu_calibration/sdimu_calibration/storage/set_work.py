@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -31,7 +33,6 @@ from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.files.config import load_imu, load_site
 from sdimu_calibration.storage.kept_report import SUFFIX, read_report, write_report
 from sdimu_calibration.storage.opening import CLASSES, DEFAULT_SITE
-from sdimu_calibration.storage.parent import end_with
 from sdimu_calibration.storage.recording_set import BagSource
 
 FEW = 3
@@ -129,6 +130,24 @@ def _from_cluster(on_cluster: Any, jobs: Sequence[Job], told: Told | None) -> li
         if told:
             told(len(found), len(jobs))
     return [found[job.member.name] for job in jobs]
+
+
+_WATCHED_S = 0.5
+"""Time (s) after which a process looks whether its parent is there."""
+
+
+def end_with(parent: int) -> None:
+    """Let this process end when its parent has ended: nobody takes what it works on.
+
+    `parent`: number of the process that started this one.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCHED_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True, name="parent").start()
 
 
 def _kept(work: Callable[[Sequence[Job]], Sequence[Report | DataError]], folder: Path | None) -> Run:

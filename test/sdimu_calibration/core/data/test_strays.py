@@ -9,7 +9,7 @@ import pytest
 
 from sdimu_calibration.core.data.arrival import RawStatus, RawTemperature, RawTest, in_order
 from sdimu_calibration.core.data.status_clock import aligned
-from sdimu_calibration.core.data.strays import strays
+from sdimu_calibration.core.data.stray_stamps import strays
 
 START = 1_700_000_000 * 10**9
 DAY = 86_400 * 10**9

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sdimu_calibration.core.handheld.forces_ahead import forces_ahead
+from sdimu_calibration.core.handheld.handheld_fit import forces_ahead
 
 
 def test_it_is_what_a_fit_without_the_rest_predicts():

@@ -14,8 +14,8 @@ from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.joint.set_averages import over_all_models
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
+from sdimu_calibration.core.joint.set_result import over_all_models
 from sdimu_calibration.core.joint.set_search import search_set, taken_back
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.posterior import coefficients

@@ -16,8 +16,7 @@ from sdimu_calibration.core.data.blocks import all_finite, ascending
 from sdimu_calibration.core.data.bursts import Bursts, find_bursts
 from sdimu_calibration.core.data.clock_steps import Step, as_recorded, find_steps, undone
 from sdimu_calibration.core.data.far_samples import TRIADS, far_samples, far_text
-from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps
-from sdimu_calibration.core.data.strays import strays, strays_note
+from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps, strays, strays_note
 from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
@@ -329,3 +328,45 @@ def _without_strays(ns: Ints, order: Ints, samples_ns: Ints, topic: str, notes: 
     if away.any():
         notes.append(strays_note(topic, ns[order][away]))
     return order[~away]
+
+
+class KeptTest:
+    """Keeps a test in memory; a journal (`storage.files.journal`) keeps it on a disk."""
+
+    def __init__(self) -> None:
+        self._samples = [(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)))]
+        self._status: list[tuple[int, bool, int]] = []
+        self._temperature: list[tuple[int, float]] = []
+
+    def samples(self, ns: Ints, omega_ib_b: Floats, f_ib_b: Floats) -> None:
+        """Keep samples.
+
+        Parameters
+        ----------
+        ns : ndarray of int, shape (n,)
+            Header stamps (ns).
+        omega_ib_b, f_ib_b : ndarray, shape (n, 3)
+            In the units of the messages.
+        """
+        block = (np.array(ns, dtype=np.int64), np.array(omega_ib_b, dtype=float), np.array(f_ib_b, dtype=float))
+        self._samples.append(block)
+
+    def status(self, ns: int, dwell: bool, stop: int) -> None:
+        """Keep a status."""
+        self._status.append((ns, dwell, stop))
+
+    def temperature(self, ns: int, value: float) -> None:
+        """Keep a temperature (deg C)."""
+        self._temperature.append((ns, value))
+
+    def raw(self) -> RawTest:
+        """Everything in the order of arrival."""
+        status = temperature = None
+        if self._status:
+            at, dwell, stop = zip(*self._status, strict=True)
+            status = RawStatus(np.array(at, np.int64), np.array(dwell), np.array(stop, np.int64))
+        if self._temperature:
+            at, value = zip(*self._temperature, strict=True)
+            temperature = RawTemperature(np.array(at, np.int64), np.array(value))
+        ns, omega, force = (np.concatenate(part) for part in zip(*self._samples, strict=True))
+        return RawTest(ns, omega, force, status, temperature)

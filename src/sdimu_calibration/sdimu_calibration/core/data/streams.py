@@ -13,9 +13,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.blocks import all_finite, pieces
+from sdimu_calibration.core.data.clock_steps import usual_interval
 from sdimu_calibration.core.data.even_clock import find_clock
-from sdimu_calibration.core.data.foreign_samples import foreign_samples
-from sdimu_calibration.core.data.relayed import relayed
 from sdimu_calibration.core.data.stream_values import (
     ADVICE,
     Samples,
@@ -25,6 +24,8 @@ from sdimu_calibration.core.data.stream_values import (
     off_clock,
     off_line,
 )
+from sdimu_calibration.core.plain_text import counted
+from sdimu_calibration.core.probability import GAUSS_MAD
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, nominal_interval_ns
 
 _MISSING = 1.5
@@ -240,3 +241,109 @@ def _turning(force: Floats) -> bool:
 def _counted(samples: Samples, rows: Ints) -> str:
     """Write how many samples a stream has, and how often."""
     return f"{len(rows)} samples at {1e9 / max(float(np.median(np.diff(samples.ns[rows]))), 1.0):.4g} Hz"
+
+
+_APART = 6.0
+"""Ratio of the distance of a stray from its neighbours to the noise (1), at least: by chance it stays below."""
+_SIDE = 5
+"""Number of samples to each side that say how rough the motion is: as long as it takes a turn to begin."""
+_ROUGH = 2.0
+"""Ratio of the distance of a stray to the largest one of the samples about it (1), at least: noise is alike."""
+_MOVED = 5.0
+"""Number of intervals in which a turn may explain the distance: a clock set back gives samples stamps of others."""
+_NEIGHBOURS = 1.3
+"""Distance (intervals) of the samples before and behind a stray at most: none of them is missing, so it is one more."""
+
+
+def foreign_samples(samples: Samples, clock: Ints, left: Ints, after: Ints) -> Split | None:
+    """Tell single samples between two others of the clock, none missing, whose values do not belong there.
+
+    Parameters
+    ----------
+    clock, left, after : ndarray of int
+        As for `off_clock`; `left` has the shape (m,).
+
+    Returns
+    -------
+    Split or None
+        None where all belong there.
+    """
+    interval = usual_interval(samples.ns[clock])
+    inside = samples.ns[clock[after]] - samples.ns[clock[after - 1]] < _NEIGHBOURS * interval
+    left, after = left[inside], after[inside]
+    if not len(left):
+        return None
+    off = np.abs(off_clock(samples, clock, left, after))
+    around = np.clip(after[:, None] + np.arange(-_SIDE - 1, _SIDE + 1), 0, len(clock) - 1)
+    beside = samples.values(clock[around])
+    rough = np.abs(off_line(beside)).max(axis=1)
+    change = np.abs(beside[:, -1] - beside[:, 0]) / (around.shape[1] - 1)
+    noise = GAUSS_MAD * np.median(np.abs(off_line(samples.values(clock[in_blocks(clock)]))), axis=(0, 1))
+    foreign = (off > np.maximum(_APART * noise, np.maximum(_ROUGH * rough, _MOVED * change))).any(axis=1)
+    if not foreign.any():
+        return None
+    # Of the same sensor are those, too, whose values happen to fit: they are one more all the same.
+    number = counted(len(left), "sample is", "samples are")
+    first = (samples.ns[left[0]] - samples.ns[clock[0]]) * 1e-9
+    note = (
+        f"{samples.topic}: {number} of another sensor and left out (the first {first:.1f} s after the start): more "
+        "than the even clock of the others has, with other values; look for a second publisher"
+    )
+    return Split(left, note)
+
+
+_REPEATED = 0.05
+"""Share of samples whose values were there before from which a relay is looked for: a short one does no harm."""
+_SAME_DELAY = 0.9
+"""Share of the repeated values that come at one delay from which they are those of a relay: a coarse sensor repeats
+its values at any distance."""
+_TWICE = 2
+"""Number of times that a relay brings a reading: a coarse sensor repeats its own more often."""
+_DELAY_SCATTER = 0.5
+"""Scatter of that delay (intervals): the jitter of two computers."""
+
+
+def relayed(samples: Samples, rows: Ints) -> Split | None:
+    """Tell readings that come once more under another stamp: a relay publishes on the topic which it listens to.
+
+    Noise does not repeat itself. A coarse sensor does, but at any distance and more than twice; messages that are sent
+    twice have one stamp.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n,)
+        Rows of finite samples by their stamps.
+
+    Returns
+    -------
+    Split or None
+        The later ones; None where readings do not repeat, or as those of a coarse sensor do.
+    """
+    some = np.sort(_marks(samples.values(rows[in_blocks(rows)])), axis=1)
+    if np.mean(some[:, 1:] == some[:, :-1]) < _REPEATED:
+        return None
+    marks = _marks(samples.values(rows))
+    order = np.argsort(marks, kind="stable")
+    first = np.flatnonzero(np.diff(marks[order], prepend=~marks[order[0]]))
+    times = np.diff(first, append=len(order))
+    again = first[times == _TWICE] + 1
+    delay = samples.ns[rows[order[again]]] - samples.ns[rows[order[again - 1]]]
+    again, delay = again[delay > 0], delay[delay > 0]
+    if _TWICE * len(again) < max(_REPEATED * len(rows), _SAME_DELAY * times[times > 1].sum()):
+        return None
+    usual = float(np.median(delay))
+    near = np.abs(delay - usual) <= _DELAY_SCATTER * usual_interval(samples.ns[rows])
+    if near.mean() < _SAME_DELAY:
+        return None
+    out = rows[order[again]]
+    note = (
+        f"{samples.topic}: {len(out)} of {len(rows)} samples are others once more, {usual * 1e-6:.3g} ms later, and "
+        f"left out (a relay publishes on the same topic, or the driver sends each reading twice); {ADVICE}"
+    )
+    return Split(out, note)
+
+
+def _marks(values: Floats) -> Ints:
+    """One number for each row (..., 6) that equal rows share."""
+    bits = np.ascontiguousarray(values + 0.0).view(np.uint64)
+    return np.asarray((bits * (2 * np.arange(6, dtype=np.uint64) + np.uint64(0x9E3779B97F4A7C15))).sum(axis=-1))

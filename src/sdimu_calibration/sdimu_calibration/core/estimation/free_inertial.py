@@ -17,13 +17,16 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import Alignment, align, azimuth_of
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
-from sdimu_calibration.core.estimation.stretch_doubt import doubt_in_stretch
+from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.evidence.noise_kernels import Stretches
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
@@ -31,6 +34,7 @@ from sdimu_calibration.core.filter.passes import Pass, one_pass, pass_input, pas
 from sdimu_calibration.core.matrix3 import put
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass, firm_setup, second_order_pass
 from sdimu_calibration.core.side_by_side import side_by_side
@@ -375,3 +379,50 @@ def _input(segment: PreparedData, kind: int, terms: Compensated, rows: slice) ->
     """Every epoch measures the same `kind`."""
     same = replace(segment, kind=np.full(len(segment.epochs), kind, dtype=np.int64))
     return pass_input(same, np.ascontiguousarray(terms.values[rows]), terms.channel, terms.parameter)
+
+
+Span = tuple[float, float]
+"""Begin and end (s)."""
+
+
+def doubt_in_stretch(
+    evidence: LinearEvidence, rows: Bools, wander: Wander, terms: Sequence[NoiseTerm], at: Span
+) -> Floats:
+    """Give the covariance that noise with a memory adds to coefficients by a part of a test, in a stretch of it.
+
+    The wander u of the biases, with signatures U and covariance K (`evidence.learned_noise`), bends a fit in white
+    noise, and the biases of the stretch are not those of the part: least squares on the rows of the part are off by
+    ``C W'U u``, the biases of the stretch by their share ``S u``, so the covariance grows by
+    ``(S - C W'U) K (S - C W'U)'``.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        Of the whole test in white noise, N rows and q coefficients.
+    rows : ndarray of bool, shape (N,)
+        Those of the part.
+    at : (float, float)
+        The stretch; its biases are taken as constant over it.
+
+    Returns
+    -------
+    ndarray, shape (q, q)
+        SI.
+    """
+    q = len(evidence.weight)
+    W = np.where(rows[:, None], evidence.W[:, :q], 0.0)
+    R = root_of(terms, wander.cut)
+    bent = solved(W.T @ W + np.diag(evidence.weight), wander.U.across(W) @ R)
+    apart = _biases(evidence.names[:q], wander.cut, at) @ R - bent
+    return np.asarray(apart @ apart.T)
+
+
+def _biases(names: Sequence[str], cut: Stretches, at: Span) -> Floats:
+    """Return the map from the mean errors of all stretches to the biases in a span of time, shape (q, 6 n)."""
+    inside = np.clip(np.minimum(cut.end, at[1]) - np.maximum(cut.start, at[0]), 0.0, None)
+    share = inside / inside.sum()
+    out = np.zeros((len(names), len(cut), 6))
+    for channel, name in enumerate(bias.NAMES):
+        if name in names:
+            out[names.index(name), :, channel] = share
+    return out.reshape(len(names), -1)

@@ -49,8 +49,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.known_coefficients import attitude_about
-from sdimu_calibration.core.filter.passes import Solution, one_pass
+from sdimu_calibration.core.filter.passes import Solution, attitude_about, one_pass
 from sdimu_calibration.core.filter.passes import solve as solve_filter
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.progress import Progress, silent

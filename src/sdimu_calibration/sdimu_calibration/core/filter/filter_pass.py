@@ -35,7 +35,6 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import predict, propagate, update, whiten
-from sdimu_calibration.core.filter.shaken import at_the_end
 from sdimu_calibration.core.matrix3 import applied, corner, elements, put, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
@@ -364,6 +363,34 @@ def _write(out: PassOutput, e: int, low: int, innovation: Floats, white: Floats,
     for group in range(low // 3, 4):
         first = 3 * group - low
         out.nis[e, group] = white[first] ** 2 + white[first + 1] ** 2 + white[first + 2] ** 2
+
+
+@compiled
+def at_the_end(latitude: float, f_n: Floats, dts: Floats, C_mean: Floats, C_nb: Floats, sums: Floats) -> None:
+    """Bring the velocity increment of an epoch from its mean attitude to the one at its end, in place.
+
+    The mean attitude of a cycle is that against the axes at its begin: half of its Earth rate is in it.
+
+    Parameters
+    ----------
+    latitude : float
+        Of the site (rad).
+    f_n : ndarray, shape (3,)
+        Specific force at rest in NED (m/s^2).
+    dts : ndarray, shape (n,)
+        Lengths of the cycles (s).
+    C_mean : ndarray, shape (n or more, 3, 3)
+        Mean attitude of each cycle, b to n (dimensionless).
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the end of the epoch, b to n (dimensionless).
+    sums : ndarray, shape (6,)
+        Angle (rad) and velocity increment (m/s) in b; the latter changes.
+    """
+    north = earth.earth_rate(latitude)[0]
+    for k in range(dts.shape[0]):
+        for i in range(3):
+            mean = C_mean[k, 2, i] - 0.5 * dts[k] * north * C_mean[k, 1, i]
+            sums[3 + i] -= dts[k] * f_n[2] * (mean - C_nb[2, i])
 
 
 @compiled

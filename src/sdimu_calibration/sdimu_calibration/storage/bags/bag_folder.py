@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO
 
-from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, named_files, read_metadata
-from sdimu_calibration.storage.bags.being_written import held
 from sdimu_calibration.storage.files.whole_file import beside, same_file, uninterrupted
 
 DAMAGED_SUFFIX = ".damaged"
@@ -20,6 +22,40 @@ _SQLITE = ("-wal", "-shm", "-journal")
 FileState = tuple[Path, int, int, int, int]
 """A file as it is now: path, size (bytes), time of its last change (ns), number on its disk, and the time (ns) that no
 program sets: a copy that keeps times, written into the file, shows there alone."""
+
+
+def hold(stream: IO[bytes]) -> None:
+    """Hold an open file until it is closed; the system lets go of that of a writer that was killed."""
+    # A file system without locks still has the file.
+    with suppress(OSError):
+        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def held(files: Iterable[Path]) -> Iterator[None]:
+    """Hold the files of a bag that is changed in its place; DataError where one of them is held already."""
+    streams: list[IO[bytes]] = []
+    try:
+        for file in files:
+            stream = file.open("rb")
+            streams.append(stream)
+            with _refused(file):
+                fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        for held_stream in streams:
+            held_stream.close()
+
+
+@contextmanager
+def _refused(file: Path) -> Iterator[None]:
+    """Tell a file that another process holds from a file system without locks, which holds nothing."""
+    try:
+        yield
+    except BlockingIOError as error:
+        raise DataError(f"{file}: is being written; end the recording first") from error
+    except OSError:
+        return
 
 
 def file_states(path: Path) -> tuple[FileState, ...]:

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
-from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps
-from sdimu_calibration.core.data.strays import strays, strays_note
+from sdimu_calibration.core.data.stray_stamps import stray_note, stray_stamps, strays, strays_note
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags import cdr
 from sdimu_calibration.storage.bags.bag_file import TopicContent, read_topics

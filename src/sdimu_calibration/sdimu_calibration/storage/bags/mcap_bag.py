@@ -13,9 +13,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.bags.bag_folder import check_room, put_in_place
+from sdimu_calibration.storage.bags.bag_folder import check_room, hold, put_in_place
 from sdimu_calibration.storage.bags.bag_metadata import FileEntry, TopicEntry, write_metadata
-from sdimu_calibration.storage.bags.being_written import hold
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.message_definition import definition, type_hash
 from sdimu_calibration.storage.files.whole_file import beside, missing_folders, remove_empty

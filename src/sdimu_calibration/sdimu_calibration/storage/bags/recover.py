@@ -11,9 +11,8 @@ from mcap.records import Schema
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_file import bag_parts, check_magic
-from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX
+from sdimu_calibration.storage.bags.bag_folder import DAMAGED_SUFFIX, held
 from sdimu_calibration.storage.bags.bag_metadata import FileEntry, TopicEntry, custom_data, write_metadata
-from sdimu_calibration.storage.bags.being_written import held
 from sdimu_calibration.storage.bags.mcap_file import McapFile
 from sdimu_calibration.storage.bags.mcap_walk import DamagedError, McapWalk
 from sdimu_calibration.storage.files.whole_file import beside, free_beside, uninterrupted

@@ -47,9 +47,9 @@ from sdimu_calibration.storage.files.result_model import (
     ResultModel,
     Said,
     complete,
+    is_semidefinite,
     read_model,
 )
-from sdimu_calibration.storage.files.semidefinite import is_semidefinite
 
 FORMAT: Final = "sdimu-result/1"
 PATHS = ("site_file", "imu_file")

@@ -162,3 +162,20 @@ def _field(hint: Any, default: Any) -> tuple[Any, Any]:
     empty = default if default is not MISSING else _NAN if hint is float else None
     hint = Annotated[float, Strict()] if hint is float else hint  # type: ignore[assignment]
     return Annotated[hint, BeforeValidator(partial(_or, empty))], ... if default is MISSING else default
+
+
+def is_semidefinite(matrix: Floats, slack: float) -> bool:
+    """Whether a matrix is symmetric and positive semidefinite, but for rounding.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (k, k)
+        Finite, in any units; its diagonal is not below zero.
+    slack : float
+        By how much an element may be wrong, as a share of the root of the product of its two diagonal elements (1).
+    """
+    size = np.sqrt(np.diag(matrix))
+    scale = np.divide(1.0, size, out=np.zeros(len(size)), where=size > 0.0)
+    shares = scale[:, None] * matrix * scale
+    least = float(np.linalg.eigvalsh(shares).min(initial=0.0))
+    return bool((np.abs(shares - shares.T) <= slack).all() and least >= -slack * max(1, len(size)))

@@ -14,8 +14,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.files.json_file import entry, read_json
 from sdimu_calibration.storage.files.result_file import read_result
-from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, wrong
-from sdimu_calibration.storage.files.semidefinite import is_semidefinite
+from sdimu_calibration.storage.files.result_model import Array, Line, ResultModel, is_semidefinite, wrong
 
 _ROUNDING = 1e-6
 """Share of the information of two coefficients (1) by which rounding may move what they have in common."""

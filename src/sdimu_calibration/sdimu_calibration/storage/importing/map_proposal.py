@@ -13,7 +13,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.axes_and_units import AS_RECORDED
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.storage.importing.array_columns import ArrayColumns, array_columns
+from sdimu_calibration.storage.importing.array_columns import array_columns
 from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
 from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale, gyro_scale
 from sdimu_calibration.storage.importing.columns import Pair, changes, pairs_by_heading, sensors_by_heading
@@ -128,9 +128,7 @@ def _suffixes(names: Sequence[str]) -> list[str]:
     return [f"_{name}" if name and clean.count(name) == 1 else f"_imu{k}" for k, name in enumerate(clean, start=1)]
 
 
-def _proposal(
-    table: Table, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]
-) -> Proposal:
+def _proposal(table: Table, numbers: Floats, pair: Pair, time: TimeColumn, found: tuple[str, str]) -> Proposal:
     by, suffix = found
     path = table.path
     names = [table.name_of(k) for k in (*pair.accel, *pair.gyro)]
