@@ -40,13 +40,9 @@ class ClassicalSolution:
     """`values`, `covariance`: SI, in the axes of the table, shapes (p,) and (p, p)."""
     chi2: float
     dof: int
-    C_start: Floats
-    """Attitude of the platform at the start (table axes to n), shape (3, 3)."""
 
 
-def solve_classical(
-    prepared: PreparedData, setup: TestSetup, table: TableLog | None, gimbals: tuple[str, str, str] = GIMBALS
-) -> ClassicalSolution:
+def solve_classical(prepared: PreparedData, setup: TestSetup, table: TableLog | None) -> ClassicalSolution:
     """Calibrate an IMU against the angles of the table.
 
     Parameters
@@ -55,12 +51,9 @@ def solve_classical(
         Its noise weighs the means; its priors are not used.
     table : TableLog or None
         Angles of the table's axes (rad).
-    gimbals : tuple of str
-        Axis letters of outer, middle and inner axis.
     """
-    log = _gimbal_log(table)
-    seen = reference_motion(prepared, setup, log, gimbals)
-    return ClassicalSolution(*_fit(prepared, setup, seen), seen.C_nb[0])
+    seen = reference_motion(prepared, setup, _gimbal_log(table))
+    return ClassicalSolution(*_fit(prepared, setup, seen))
 
 
 def _gimbal_log(log: TableLog | None) -> TableLog:
@@ -73,15 +66,13 @@ def _gimbal_log(log: TableLog | None) -> TableLog:
     return log
 
 
-def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> Floats:
+def table_attitude(log: TableLog, t: Floats) -> Floats:
     """Attitude of the platform: outer, then middle, then inner turn.
 
     Parameters
     ----------
     t : ndarray, shape (n,)
         Times (s).
-    gimbals : tuple of str
-        Axis letters of the outer, middle and inner gimbal.
 
     Returns
     -------
@@ -89,7 +80,7 @@ def table_attitude(log: TableLog, t: Floats, gimbals: tuple[str, str, str]) -> F
         Platform to table base (dimensionless).
     """
     C = np.broadcast_to(np.eye(3), (len(t), 3, 3))
-    for name, letter in zip(("outer", "middle", "inner"), gimbals, strict=True):
+    for name, letter in zip(("outer", "middle", "inner"), GIMBALS, strict=True):
         # An encoder may count from -180 to 180 deg: between two readings it did not turn back by almost a whole turn.
         angle = np.interp(t, log.t, np.unwrap(log.angle[:, log.names.index(name)]))
         C = C @ _about(letter, angle)
@@ -107,11 +98,11 @@ def _about(letter: str, angle: Floats) -> Floats:
     return C
 
 
-def reference_motion(prepared: PreparedData, setup: TestSetup, log: TableLog, gimbals: tuple[str, str, str]) -> Motion:
+def reference_motion(prepared: PreparedData, setup: TestSetup, log: TableLog) -> Motion:
     """Make the motion that a perfect IMU along the table's axes would have seen."""
     c = prepared.cycles
     edges = np.append(c.t[0] - c.dt[0], c.t)
-    C = table_attitude(log, edges, gimbals)
+    C = table_attitude(log, edges)
     middle = 0.5 * (C[:-1] + C[1:])
     # Half of C' dC - its transpose is the sine of the small turn in a cycle.
     turn = np.transpose(C[:-1], (0, 2, 1)) @ C[1:]

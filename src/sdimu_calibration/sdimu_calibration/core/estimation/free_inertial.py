@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects import bias
-from sdimu_calibration.core.estimation.holdout import WANTED_S, Segment, holdout_segments, part
-from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate
+from sdimu_calibration.core.estimation.holdout import Segment, holdout_segments, part
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -38,6 +37,10 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass, firm_setup, second_order_pass
 from sdimu_calibration.core.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    # A fit that navigates takes its free navigations from here.
+    from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 
 NOTHING = "no compensation"
 _WIDE_LEVEL = 1e-2
@@ -98,65 +101,11 @@ class Compensated(NamedTuple):
     """`channel`, `parameter`: channel that a column changes, and the coefficient it belongs to, shape (m,)."""
 
 
-class Navigator(Protocol):
-    """What free navigation needs of a fit."""
-
-    @property
-    def setup(self) -> TestSetup:
-        """Site, IMU and sensor model, as the estimator has them."""
-
-    @property
-    def last(self) -> Pass | SecondOrderPass:
-        """The last pass of the estimator."""
-
-    @property
-    def estimate(self) -> Floats:
-        """Coefficients of the estimator (SI), shape (q,)."""
-
-    @property
-    def estimate_covariance(self) -> Floats:
-        """Covariance of `estimate` (SI), shape (q, q)."""
-
-    @property
-    def noise(self) -> NoiseEstimate | None:
-        """Noise with a memory that was learned."""
-
-    @property
-    def wander(self) -> Wander:
-        """How wandering biases of the sensors would show in the recording."""
-
-    @property
-    def bare(self) -> LinearEvidence:
-        """Whitened innovations about this fit and the signatures of its coefficients."""
-
-    def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
-        """Fit the same model to a part of the recording.
-
-        Parameters
-        ----------
-        C_nb : ndarray, shape (3, 3)
-            Attitude at the start of the part (dimensionless).
-        """
-
-    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors of the sensors out of all cycles.
-
-        Parameters
-        ----------
-        estimate : ndarray, shape (q,)
-            Coefficients (SI).
-        C_start : ndarray, shape (3, 3)
-            Attitude at the start.
-        end_of_fit : float
-            Where the fit ended (s).
-        """
-
-
 @dataclass(frozen=True)
 class Refit:
     """A fit to a part of the recording."""
 
-    fit: Navigator
+    fit: NavigationFit
     """Of the same model: how it takes errors out of samples."""
     estimate: Floats
     covariance: Floats
@@ -165,25 +114,22 @@ class Refit:
 
 
 def free_inertial_runs(
-    prepared: PreparedData, fits: Sequence[tuple[str, Navigator]], reference: PassOutput, wanted_s: float = WANTED_S
+    prepared: PreparedData, fits: Sequence[tuple[str, NavigationFit]], reference: PassOutput
 ) -> tuple[FreeInertialRun, ...]:
     """Navigate unseen segments uncompensated and with each model, fitted to the rest of the recording.
 
     Parameters
     ----------
-    fits : sequence of (str, Navigator)
+    fits : sequence of (str, NavigationFit)
         Names and fits of the whole recording; each is fitted again to the rest.
     reference : PassOutput
         Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
-    wanted_s : float
-        Length of the navigation (s).
     """
-    segments = holdout_segments(prepared, wanted_s)
-    return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), segments))
+    return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), holdout_segments(prepared)))
 
 
 def _run(
-    prepared: PreparedData, fits: Sequence[tuple[str, Navigator]], reference: PassOutput, segment: Segment
+    prepared: PreparedData, fits: Sequence[tuple[str, NavigationFit]], reference: PassOutput, segment: Segment
 ) -> FreeInertialRun:
     seen = part(prepared, *segment.seen)
     drifts = [free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
@@ -194,7 +140,7 @@ def _run(
     return FreeInertialRun(segment, tuple(drifts))
 
 
-def _in_learned_noise(again: Refit, fit: Navigator, segment: Segment) -> Refit:
+def _in_learned_noise(again: Refit, fit: NavigationFit, segment: Segment) -> Refit:
     """Let the covariance of a refit hold in the segment, in the noise that the fit of the whole recording learned."""
     if fit.noise is None:
         return again
@@ -206,7 +152,7 @@ def _in_learned_noise(again: Refit, fit: Navigator, segment: Segment) -> Refit:
     )
 
 
-def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
+def refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
     """Fit a part of the recording, from the fit of the whole.
 
     The coefficients move by little, so a few passes from the known ones do. Each pass leaves a share of the error of
@@ -232,7 +178,7 @@ def refit(fit: Navigator, seen: PreparedData, C_nb: Floats) -> Refit:
 
 
 def _one_pass(
-    fit: Navigator, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats, near: Floats | None
+    fit: NavigationFit, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats, near: Floats | None
 ) -> Pass | SecondOrderPass:
     """Make one pass, of the kind that the fit makes, from an attitude (3, 3) and coefficients (q,).
 

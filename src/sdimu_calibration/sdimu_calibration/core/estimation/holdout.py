@@ -48,8 +48,8 @@ class Segment:
     """`begin_s`, `levelled_s`, `length_s`: begin of navigation, length of levelling and of navigation."""
 
 
-def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tuple[Segment, ...]:
-    """Choose what to keep from the fit: `wanted_s` of navigation after a dwell, at the end and at the start.
+def holdout_segments(prepared: PreparedData) -> tuple[Segment, ...]:
+    """Choose what to keep from the fit: `WANTED_S` of navigation after a dwell, at the end and at the start.
 
     Of a recording too short for that, the longest segments that leave half of it to the fit.
     """
@@ -60,7 +60,7 @@ def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tupl
     level = np.minimum(rested, LEVEL_S)
     # Where a dwell ends, or has lasted long enough.
     ready = (rested >= _LEAST_LEVEL_S) & (np.append(~used[1:], True) | (rested >= LEVEL_S - 1e-6))
-    found = [s for s in (_at_end(prepared, ready, level, wanted_s), _at_start(prepared, ready, level, wanted_s)) if s]
+    found = [s for s in (_at_end(prepared, ready, level), _at_start(prepared, ready, level)) if s]
     if not found:
         raise DataError(
             f"the recording is too short to keep {LEAST_S:.0f} s after a dwell from the fit and leave half of it"
@@ -68,20 +68,20 @@ def holdout_segments(prepared: PreparedData, wanted_s: float = WANTED_S) -> tupl
     return tuple(found)
 
 
-def _at_end(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+def _at_end(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | None:
     """Segment at the end; `ready` (e,) says after which epochs one may begin, `level` (e,) how long it levels (s)."""
     end = prepared.epochs.end
     fits = ready & (end - level >= _KEPT * end[-1])
-    late = np.flatnonzero(fits & (end <= end[-1] - wanted_s + 1e-6))
+    late = np.flatnonzero(fits & (end <= end[-1] - WANTED_S + 1e-6))
     if not fits.any():
         return None
     at = int(late[-1] if len(late) else np.flatnonzero(fits)[0])
-    last = int(np.searchsorted(end, end[at] + wanted_s + 1e-6, side="right"))
+    last = int(np.searchsorted(end, end[at] + WANTED_S + 1e-6, side="right"))
     first = _level_from(prepared, at, level)
     return _segment("end", prepared, first, at, last, (0, first))
 
 
-def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: float) -> Segment | None:
+def _at_start(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | None:
     """Segment at the start, with the arguments of `_at_end`."""
     epochs, used = prepared.epochs, prepared.phases.used
     if not ready.any():
@@ -92,9 +92,9 @@ def _at_start(prepared: PreparedData, ready: Bools, level: Floats, wanted_s: flo
     resumes = resumes[resumes > at]
     if not len(resumes):
         return None
-    after = np.flatnonzero(epochs.start[resumes] >= epochs.end[at] + wanted_s - 1e-6)
+    after = np.flatnonzero(epochs.start[resumes] >= epochs.end[at] + WANTED_S - 1e-6)
     resume = int(resumes[after[0]] if len(after) else resumes[-1])
-    last = min(resume, int(np.searchsorted(epochs.end, epochs.end[at] + wanted_s + 1e-6, side="right")))
+    last = min(resume, int(np.searchsorted(epochs.end, epochs.end[at] + WANTED_S + 1e-6, side="right")))
     return _segment("start", prepared, _level_from(prepared, at, level), at, last, (resume, len(epochs)))
 
 

@@ -17,7 +17,7 @@ from sdimu_calibration.core.data.imu_class import understated_noise
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
-from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, Navigator, free_inertial_runs
+from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.estimation.same_data import checksum, conditions
@@ -133,7 +133,7 @@ class NavigationFit(Fit):
         """
 
     @abstractmethod
-    def on(self, prepared: PreparedData, C_nb: Floats) -> Navigator:
+    def on(self, prepared: PreparedData, C_nb: Floats) -> NavigationFit:
         """Fit the same model to a part of the recording.
 
         Parameters

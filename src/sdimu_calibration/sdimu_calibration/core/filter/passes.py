@@ -61,8 +61,6 @@ SNAPSHOT_EPOCHS = 5
 class Pass(FinishedPass):
     """A pass about samples corrected to first order, in the frame of the prior."""
 
-    settings: PassSettings
-
     @property
     def about(self) -> Floats:
         """Coefficients that are in use, shape (p,)."""
@@ -225,8 +223,7 @@ def one_pass(
     begin = start_state(setup, start, C_nb, reference)
     state = PassState(*(v.copy() for v in begin))
     output = new_output(len(prepared.epochs), len(sensors.prior), keep, SNAPSHOT_EPOCHS)
-    settings = pass_settings(setup, closed_loop)
-    run_pass(data, settings, state, output)
+    run_pass(data, pass_settings(setup, closed_loop), state, output)
     try:
         check_finite(state)
     except DivergedError as error:
@@ -235,7 +232,7 @@ def one_pass(
         if told:
             raise DataError(told) from error
         raise
-    return Pass(C_nb, begin, state, output, data, settings)
+    return Pass(C_nb, begin, state, output, data)
 
 
 def check_finite(state: PassState) -> None:

@@ -99,7 +99,6 @@ def search_set(
     run: Run,
     extra: Sequence[Effect] = (),
     progress: Progress = silent,
-    alpha: float = FALSE_ALARM,
     fitted: SetFit | None = None,
 ) -> SetSearch:
     """Find what the model of a set misses.
@@ -112,8 +111,6 @@ def search_set(
         Does the jobs.
     extra : sequence of Effect
         The user's own effects, tried with the catalogue.
-    alpha : float
-        False-alarm probability of a whole scan.
     fitted : SetFit, optional
         The set with the model as given, where it was fitted already.
     """
@@ -131,7 +128,7 @@ def search_set(
         again = evidence.as_candidates(columns, tried)
         names = {c.label: evidence.names[column] for c, column in zip(tried, columns.tolist(), strict=True)}
         boards, limit = partial(SetBoard, full, names), first.threshold if first else None
-        found = search(again, _singles(again), None, alpha, limit, found, tell_noise=False, make=boards)
+        found = search(again, _singles(again), None, FALSE_ALARM, limit, found, tell_noise=False, make=boards)
         found = with_steps(found)
         first = first or found
         chosen = _first_ones(fit, found, told)

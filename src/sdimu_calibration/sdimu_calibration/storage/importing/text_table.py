@@ -103,11 +103,6 @@ class TextTable:
         self._width = len(self._cells(self._lines[self._begin]))
         self._note_left_out()
 
-    @property
-    def width(self) -> int:
-        """Number of columns."""
-        return self._width
-
     def name_of(self, column: int) -> int | str:
         """Name a column, from 0, as a map does: by its heading, or from 1 where that does not name it alone."""
         heading = self.headings[column] if column < len(self.headings) else ""
