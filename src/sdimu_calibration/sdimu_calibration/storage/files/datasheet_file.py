@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal
 
 from sdimu_calibration.core.fleet import sheet
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.file_hashes import file_hashes
 from sdimu_calibration.storage.files.fleet_folder import Entry
-from sdimu_calibration.storage.files.json_file import entry
-from sdimu_calibration.storage.files.result_model import Entry as DataclassEntry
-from sdimu_calibration.storage.files.result_model import Line, ResultModel
+from sdimu_calibration.storage.files.json_file import entry, write_json
 
-FORMAT: Final = "sdimu-datasheet/1"
+FORMAT = "sdimu-datasheet/1"
 
 
 @dataclass(frozen=True)
@@ -33,46 +30,16 @@ class Certificate:
     """Name and SHA-256 of each file of the recordings; the second is empty where the file was not found."""
 
 
-class HashedFile(ResultModel):
-    """A file of a recording; its digest is empty where the file was not found."""
-
-    file: Line
-    sha256: Line
-
-
-class SheetResult(ResultModel):
-    """A result that the data sheet is made of."""
-
-    name: Line
-    unit: Line
-
-
-class DatasheetFile(ResultModel):
-    """datasheet.json, in the order of its keys: a `Certificate`, then what it vouches for."""
-
-    format: Literal["sdimu-datasheet/1"] = FORMAT
-    serial: Line = ""
-    date: Line = ""
-    operator: Line = ""
-    plan: Line = ""
-    version: Line = ""
-    recordings: tuple[HashedFile, ...] = ()
-    results: tuple[SheetResult, ...]
-    lines: tuple[Annotated[sheet.Line, DataclassEntry({"verdict": lambda line: line.verdict})], ...]
-
-
 def write_datasheet(path: Path, lines: Sequence[sheet.Line], about: Certificate, entries: Sequence[Entry]) -> None:
-    """Write datasheet.json: SI numbers, ``null`` for what was not measured.
-
-    `entries`: the results that it is made of.
-    """
-    DatasheetFile.model_construct(
-        format=FORMAT,
+    """Write datasheet.json: SI numbers, ``null`` for what was not measured."""
+    content = {
+        "format": FORMAT,
         **entry(about, "serial date operator plan version"),
-        recordings=tuple(HashedFile.model_construct(file=name, sha256=digest) for name, digest in about.recordings),
-        results=tuple(SheetResult.model_construct(**entry(one, "name unit")) for one in entries),
-        lines=tuple(lines),
-    ).write(path)
+        "recordings": [{"file": name, "sha256": digest} for name, digest in about.recordings],
+        "results": [entry(one, "name unit") for one in entries],
+        "lines": [asdict(line) | {"verdict": line.verdict} for line in lines],
+    }
+    write_json(path, content)
 
 
 def hashed(entries: Sequence[Entry], given: Sequence[Path]) -> tuple[tuple[str, str], ...]:

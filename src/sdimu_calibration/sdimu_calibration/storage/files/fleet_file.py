@@ -5,130 +5,57 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Any
 
-import numpy as np
 import yaml
 
 from sdimu_calibration.core.effect_key import effect_of
-from sdimu_calibration.core.fleet.common import CommonEffect
-from sdimu_calibration.core.fleet.population import Coefficient, Out
+from sdimu_calibration.core.fleet.population import Coefficient
 from sdimu_calibration.core.fleet.priors import population_priors
 from sdimu_calibration.core.fleet.reml import RandomEffect
 from sdimu_calibration.core.fleet.study import Study
-from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.storage.files.config import find_config, imu_mapping
 from sdimu_calibration.storage.files.fleet_folder import Gathered
-from sdimu_calibration.storage.files.json_file import entry
-from sdimu_calibration.storage.files.result_file import PATHS
-from sdimu_calibration.storage.files.result_model import Array, Entry, Line, Number, ResultModel, Said
+from sdimu_calibration.storage.files.json_file import entry, write_json
+from sdimu_calibration.storage.files.result_file import ORIGIN
 from sdimu_calibration.storage.files.whole_file import same_file, write_whole
 
-FORMAT: Final = "sdimu-fleet/1"
-
-
-class FleetResult(ResultModel):
-    """A result that the fleet is made of."""
-
-    name: Line
-    unit: Line
-    origin: Annotated[Origin, Entry(seldom=PATHS)]
-
-
-class FleetCoefficient(ResultModel):
-    """A coefficient over units (SI), each number with its interval at 95 %; `within` where a unit has two results."""
-
-    name: Line
-    unit: Line
-    display_unit: Line
-    mean: Number
-    mean_low: Number
-    mean_high: Number
-    spread: Number
-    spread_low: Number
-    spread_high: Number
-    within: Number = np.nan
-    within_low: Number = np.nan
-    within_high: Number = np.nan
-    q: Number
-    dof: int
-    p_value: Number
-    control_low: Number
-    control_high: Number
-    values: Array
-    sigmas: Array
-    deviates: Array
-
-
-class FleetTrend(ResultModel):
-    """A `Trend`: its slope is in `unit` per `per`."""
-
-    coefficient: Line
-    kind: Line
-    slope: Number
-    slope_sigma: Number
-    p_value: Number
-    q_value: Number
-    named: bool
-    per: Literal["year"] = "year"
-    unit: Line
-
-
-class FleetFile(ResultModel):
-    """fleet.json, in the order of its keys."""
-
-    format: Literal["sdimu-fleet/1"] = FORMAT
-    imu: Line
-    model: tuple[Line, ...]
-    body_frame: Line
-    results: tuple[FleetResult, ...]
-    apart: tuple[Said, ...]
-    units: tuple[Line, ...]
-    coefficients: tuple[FleetCoefficient, ...]
-    out: tuple[Annotated[Out, Entry()], ...]
-    trends: tuple[FleetTrend, ...]
-    common_effects: tuple[Annotated[CommonEffect, Entry()], ...]
+FORMAT = "sdimu-fleet/1"
 
 
 def write_fleet(path: Path, gathered: Gathered, done: Study) -> None:
     """Write fleet.json. `done`: what they say together."""
     first = gathered.entries[0].result
     shown = dict(zip(first.names, zip(first.units, first.display_units, strict=True), strict=True))
-    FleetFile.model_construct(
-        format=FORMAT,
-        imu=first.origin.imu,
+    both = zip(done.people.coefficients, done.inside.coefficients, strict=True)
+    content = {
+        "format": FORMAT,
+        "imu": first.origin.imu,
         **entry(first, "model body_frame"),
-        results=tuple(
-            FleetResult.model_construct(**entry(e, "name unit origin=result.origin")) for e in gathered.entries
-        ),
-        apart=gathered.apart,
-        units=done.people.units,
-        coefficients=tuple(
-            _coefficient(one, inside.control_limits, *shown[one.name])
-            for one, inside in zip(done.people.coefficients, done.inside.coefficients, strict=True)
-        ),
-        out=done.people.out,
-        trends=tuple(
-            FleetTrend.model_construct(**asdict(one), per="year", unit=shown[one.coefficient][0]) for one in done.slopes
-        ),
-        common_effects=done.common,
-    ).write(path)
+        "results": [entry(e, "name unit", origin=ORIGIN.plain(e.result.origin)) for e in gathered.entries],
+        "apart": gathered.apart,
+        "units": done.people.units,
+        "coefficients": [_coefficient(one, inside.control_limits, *shown[one.name]) for one, inside in both],
+        "out": list(map(asdict, done.people.out)),
+        "trends": [asdict(one) | {"per": "year", "unit": shown[one.coefficient][0]} for one in done.slopes],
+        "common_effects": list(map(asdict, done.common)),
+    }
+    write_json(path, content)
 
 
-def _coefficient(one: Coefficient, limits: tuple[float, float], unit: str, display_unit: str) -> FleetCoefficient:
+def _coefficient(one: Coefficient, limits: tuple[float, float], unit: str, display_unit: str) -> dict[str, Any]:
+    """Give a coefficient over units as plain data (SI), with intervals at 95 %; `within` if a unit has two results."""
     low, high = one.between.mean_interval
-    return FleetCoefficient.model_construct(
-        unit=unit,
-        display_unit=display_unit,
-        mean_low=low,
-        mean_high=high,
+    return {
+        **entry(one, "name", unit=unit, display_unit=display_unit),
+        **entry(one.between, "mean", mean_low=low, mean_high=high),
         **_spread("spread", one.between),
         **({} if one.within is None else _spread("within", one.within)),
-        **entry(one.between, "mean q dof p_value", control_low=limits[0], control_high=limits[1]),
-        **entry(one, "name values sigmas deviates"),
-    )
+        **entry(one.between, "q dof p_value", control_low=limits[0], control_high=limits[1]),
+        **entry(one, "values sigmas deviates"),
+    }
 
 
 def _spread(name: str, found: RandomEffect) -> dict[str, Any]:

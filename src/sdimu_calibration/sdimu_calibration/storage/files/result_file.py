@@ -52,8 +52,8 @@ from sdimu_calibration.storage.files.result_model import (
 )
 
 FORMAT: Final = "sdimu-result/1"
-PATHS = ("site_file", "imu_file")
-"""Entries of an origin that stand in a file only where the user named a path."""
+ORIGIN = Entry(seldom=("site_file", "imu_file"))
+"""How an origin stands in a file: with paths only where the user named them."""
 _ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
 """How a line of a file ends that advises a diagnosis."""
 _TOPICS = {NOT_TRUSTED: Topic.NOT_TRUSTED, INSEPARABLE: Topic.INSEPARABLE}
@@ -139,7 +139,7 @@ class ResultFile(ResultModel):
 
     format: Literal["sdimu-result/1"] = FORMAT
     verdict: str = ""
-    origin: Annotated[Origin, Entry(seldom=PATHS), AfterValidator(_is_stamped), AfterValidator(_is_ranged)] = Origin()
+    origin: Annotated[Origin, ORIGIN, AfterValidator(_is_stamped), AfterValidator(_is_ranged)] = Origin()
     imu_noise: ImuNoise | None = None
     estimator: Line = ""
     estimator_reason: Line = ""
