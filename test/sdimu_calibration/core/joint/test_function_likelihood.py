@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
-from sdimu_calibration.core.joint.function_fit import Beside, needless
-from sdimu_calibration.core.joint.function_sizes import function_sizes, with_weights
+from sdimu_calibration.core.joint.function_fit import Beside, function_sizes, needless, with_weights
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 
