@@ -18,9 +18,8 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes import diagnosis_messages as messages
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, publish
-from sdimu_calibration.nodes.diagnosis_worker import Answer, WorkerRequest, WorkerSetup
+from sdimu_calibration.nodes.diagnosis_worker import DIAGNOSIS, REPORT, Answer, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.live_diagnosis import Worker
-from sdimu_calibration.nodes.live_report import DIAGNOSIS, REPORT
 from sdimu_calibration.report.live_text import diagnosis_line
 
 

@@ -16,17 +16,26 @@ from pathlib import Path
 from typing import Any
 
 from sdimu_calibration.core.data.arrival import in_order, until
+from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, ModelError, error_of, so_far, waiting
+from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
+from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.nodes.live_report import leave_report
+from sdimu_calibration.report.cost import held_to_use
 from sdimu_calibration.report.live_picture import live_picture
+from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.report_extras import report_extras
+from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.journal import read_journal
 from sdimu_calibration.storage.files.model_choice import by_hand, model_word, named_model
+from sdimu_calibration.storage.files.whole_file import written_together
+from sdimu_calibration.storage.trace import traced
 
 Question = Callable[[Fit, LiveDiagnosis, Any], Any]
 """A further question of a fit: `WorkerSetup.question`."""
@@ -157,6 +166,28 @@ class Diagnoser:
             opened = open_test(in_order(raw), self._setup.options)
             self._test = until_ns, PreparedTest(opened.recording, opened.imu, opened.site)
         return self._test[1]
+
+
+DIAGNOSIS, REPORT = "diagnosis.json", "report.html"
+"""Names of the files."""
+
+
+def leave_report(folder: Path, test: PreparedTest, model: Model, name: str) -> None:
+    """Write diagnosis.json and report.html of a test that has ended.
+
+    They come beside the result.json of the node, which stays as it is: write it first.
+
+    `model`: with what was added to it; `name`: of the model, for the page. Raises DataError where the test cannot be
+    diagnosed.
+    """
+    found = climb(solve(test, model))
+    more = report_extras(found)
+    summary = summarise(held_to_use(found, more))
+    result = outcome(found.fit, refuse=False)
+    with written_together(folder) as part:
+        write_diagnosis(part / DIAGNOSIS, summary)
+        title = f"Live test, model {name}"
+        write_report(part / REPORT, result, title=title, summary=summary, more=more, trace=traced(model=name))
 
 
 def work(pipe: Connection) -> None:

@@ -7,10 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
+from zlib import crc32
 
 import numpy as np
 
+from sdimu_calibration.core.alignment.prepared import TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.references import told_of
@@ -23,7 +26,7 @@ from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
-from sdimu_calibration.core.recording import DataFault, TemperatureLog
+from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
 from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import Model
@@ -35,9 +38,51 @@ NOT_CONVERGED = Note(
 )
 
 
-def temperature_counts(log: TemperatureLog | None) -> dict[str, float]:
-    """Make the entries of a temperature in the data section of a result: who uses the result needs to know T0."""
-    return {} if log is None or not len(log.t) else {START_TEMPERATURE: log.origin_degc}
+def counts_of(
+    recording: Recording, lost: Ints, stops: int, conditions: float, contradicted_s: float = 0.0
+) -> dict[str, float]:
+    """Make the entries of the data section of a result.
+
+    Parameters
+    ----------
+    lost : ndarray of int, shape (n,)
+        Samples missing before each cycle.
+    conditions : float
+        As `checksum` gives it, of what the recording was fitted under.
+    contradicted_s : float
+        Time (s) in which the IMU moved although the table said dwell.
+    """
+    log = recording.temperature
+    # Who uses the result needs to know from which temperature its effects count.
+    heat = {} if log is None or not len(log.t) else {START_TEMPERATURE: log.origin_degc}
+    return heat | {
+        "samples": float(len(recording.t)),
+        "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
+        "lost": float(lost.sum()),
+        "rejected": float(recording.rejected),
+        "contradicted_s": contradicted_s,
+        "duration_s": float(recording.t[-1]),
+        "stops": float(stops),
+        "conditions": conditions,
+    }
+
+
+def checksum(*arrays: Floats) -> float:
+    """Give a number that other samples do not have: the same recording is known again by it."""
+    value = 0
+    for array in arrays:
+        for rows in pieces(len(array)):
+            value = crc32(np.ascontiguousarray(array[rows]).tobytes(), value)
+        let_go(array)
+    return float(value)
+
+
+def conditions(setup: TestSetup) -> float:
+    """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
+    site, imu = setup.site, setup.imu
+    sigmas = tuple(v for v in (site.latitude_sigma_rad, site.gravity_sigma_m_s2) if v)
+    place = (site.latitude_rad, site.height_m, setup.gravity, *sigmas)
+    return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.accelerometer_frame import FRAME
 from sdimu_calibration.core.effects.effect import Effect, Timetable
-from sdimu_calibration.core.estimation.fit import Fit, Start, temperature_counts
+from sdimu_calibration.core.estimation.fit import Fit, Start, checksum, counts_of
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
-from sdimu_calibration.core.estimation.same_data import checksum
 from sdimu_calibration.core.evidence.consistency import NO_NOISE, Consistency
 from sdimu_calibration.core.evidence.handheld_evidence import HandheldEvidence, handheld_evidence, places, timetable
 from sdimu_calibration.core.evidence.information import conditioned
@@ -162,17 +161,9 @@ class HandheldFit(Fit):
 
     def data_counts(self) -> dict[str, float]:
         """Entries of the data section of a result."""
-        recording = self.ready.recording
-        return temperature_counts(recording.temperature) | {
-            "samples": float(len(recording.t)),
-            "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
-            "lost": float(self.ready.run.cycles.lost.sum()),
-            "rejected": float(recording.rejected),
-            "contradicted_s": 0.0,
-            "duration_s": float(recording.t[-1]),
-            "stops": float(len(self.ready.run.t)),
-            "conditions": checksum(np.array([self.priors.gravity, *self.priors.earth_mean])),
-        }
+        run = self.ready.run
+        under = checksum(np.array([self.priors.gravity, *self.priors.earth_mean]))
+        return counts_of(self.ready.recording, run.cycles.lost, len(run.t), under)
 
     def notes(self) -> tuple[str, ...]:
         """Say what was assumed, learned and not determined."""

@@ -16,11 +16,10 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.imu_class import understated_noise
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import Effect, Timetable
-from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, temperature_counts
+from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, conditions, counts_of
 from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
-from sdimu_calibration.core.estimation.same_data import checksum, conditions
 from sdimu_calibration.core.estimation.site_rows import at_site, with_found
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -365,17 +364,10 @@ class NavigationFit(Fit):
 
     def data_counts(self) -> dict[str, float]:
         """Entries of the data section of a result."""
-        recording, phases, epochs = self.test.recording, self.prepared.phases, self.prepared.epochs
-        return temperature_counts(recording.temperature) | {
-            "samples": float(len(recording.t)),
-            "checksum": checksum(recording.t, recording.omega_ib_b, recording.f_ib_b),
-            "lost": float(self.prepared.cycles.lost.sum()),
-            "rejected": float(recording.rejected),
-            "contradicted_s": float((epochs.end - epochs.start)[phases.contradicted].sum()),
-            "duration_s": float(recording.t[-1]),
-            "stops": float(len(np.unique(phases.stop[phases.used]))),
-            "conditions": conditions(self.setup),
-        }
+        phases, epochs = self.prepared.phases, self.prepared.epochs
+        stops = len(np.unique(phases.stop[phases.used]))
+        against = float((epochs.end - epochs.start)[phases.contradicted].sum())
+        return counts_of(self.test.recording, self.prepared.cycles.lost, stops, conditions(self.setup), against)
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found, and those held out."""
