@@ -30,12 +30,7 @@ def say(console: Console, text: str) -> None:
     Spaces before the first word stay: they say that the line belongs to the one above.
     """
     indent = " " * (len(text) - len(text.lstrip(" ")))
-    line = indent + one_line(text, None)
-    if console.is_terminal:
-        line = textwrap.fill(
-            line, console.width, subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False
-        )
-    console.print(line, soft_wrap=True, highlight=False)
+    _wrapped(console, indent + one_line(text, None), f"{indent}  ")
 
 
 def pair(console: Console, name: str, text: str, width: int) -> None:
@@ -44,10 +39,14 @@ def pair(console: Console, name: str, text: str, width: int) -> None:
     `width`: characters of the longest name.
     """
     before = f"  {one_line(name, None):{width}}  "
-    line = before + one_line(text, None)
+    _wrapped(console, before + one_line(text, None), " " * len(before))
+
+
+def _wrapped(console: Console, line: str, indent: str) -> None:
+    """Print a line; in a terminal the lines that it is wrapped into begin with `indent`."""
     if console.is_terminal:
         line = textwrap.fill(
-            line, console.width, subsequent_indent=" " * len(before), break_long_words=False, break_on_hyphens=False
+            line, console.width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
         )
     console.print(line, soft_wrap=True, highlight=False)
 

@@ -102,14 +102,7 @@ def until(raw: RawTest, ns: int) -> RawTest:
         The last stamp that counts (ns).
     """
     rows = raw.ns <= ns
-    return replace(
-        raw,
-        ns=raw.ns[rows],
-        omega_ib_b=raw.omega_ib_b[rows],
-        f_ib_b=raw.f_ib_b[rows],
-        status=_until(raw.status, ns),
-        temperature=_until(raw.temperature, ns),
-    )
+    return replace(_with_rows(raw, rows), status=_until(raw.status, ns), temperature=_until(raw.temperature, ns))
 
 
 def _until(messages: M | None, ns: int) -> M | None:
@@ -262,7 +255,7 @@ def in_order(raw: RawTest) -> Recording:
     )
 
 
-def _with_rows(raw: RawTest, rows: Ints) -> RawTest:
+def _with_rows(raw: RawTest, rows: Ints | Bools) -> RawTest:
     return replace(raw, ns=raw.ns[rows], omega_ib_b=raw.omega_ib_b[rows], f_ib_b=raw.f_ib_b[rows])
 
 

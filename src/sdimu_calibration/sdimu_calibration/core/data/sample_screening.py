@@ -82,17 +82,30 @@ def sound(recording: Recording) -> tuple[Recording, tuple[DataFault, ...]]:
                 found.setdefault(kind, []).append((name, rows))
                 bad[rows] = True
     faults = tuple(_fault(kind, where, recording.t) for kind, where in found.items())
-    if not bad.any():
-        return recording, ()
+    return (taken_away(recording, bad), faults) if bad.any() else (recording, ())
+
+
+def taken_away(recording: Recording, bad: Bools) -> Recording:
+    """Take samples away.
+
+    Parameters
+    ----------
+    bad : ndarray, shape (n,)
+        True for a sample to be taken away.
+
+    Returns
+    -------
+    Recording
+        With these samples counted as rejected, and their times as gaps.
+    """
     keep = ~bad
-    mended = replace(
+    return replace(
         recording,
         t=recording.t[keep],
         omega_ib_b=recording.omega_ib_b[keep],
         f_ib_b=recording.f_ib_b[keep],
         rejected=recording.rejected + int(bad.sum()),
     )
-    return mended, faults
 
 
 def _on_channels(recording: Recording, work: Callable[[Floats], R]) -> list[tuple[str, R]]:

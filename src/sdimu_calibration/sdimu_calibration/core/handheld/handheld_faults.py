@@ -13,7 +13,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.data.gaps import open_angle, step_fault, told_together
-from sdimu_calibration.core.data.sample_screening import CHANNELS
+from sdimu_calibration.core.data.sample_screening import CHANNELS, taken_away
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.handheld.handheld_fit import HandheldSolution
 from sdimu_calibration.core.handheld.range_end import at_range_end
@@ -51,15 +51,7 @@ def without_impossible(recording: Recording) -> tuple[Recording, tuple[DataFault
         f"the gyros jump to {_BEYOND:.0f} times the fastest turns and more in {counted(len(t), 'sample')} "
         f"({t[0]:.1f} to {t[-1]:.1f} s), taken as missing"
     )
-    keep = ~bad
-    mended = replace(
-        recording,
-        t=recording.t[keep],
-        omega_ib_b=recording.omega_ib_b[keep],
-        f_ib_b=recording.f_ib_b[keep],
-        rejected=recording.rejected + len(t),
-    )
-    return mended, (DataFault("spike", text, len(t), float(t[0]), float(t[-1])),)
+    return taken_away(recording, bad), (DataFault("spike", text, len(t), float(t[0]), float(t[-1])),)
 
 
 def data_faults(recording: Recording, run: HandheldRun, found: HandheldSolution) -> tuple[DataFault, ...]:
