@@ -206,7 +206,7 @@ def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     from sdimu_calibration.storage.files.effect_file import extended_model
 
     chosen = extended_model(model or (test.model if test is not None else "baseline"), added)
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in chosen.effects]
+    effects = [selection.resolve(e) for e in chosen.effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
     keys = [effect.key for effect in effects]
     if test is None:

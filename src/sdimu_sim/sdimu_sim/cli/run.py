@@ -321,7 +321,7 @@ def _test(plan: str | None, model: str, duration: float) -> Outline:
     from sdimu_calibration.storage.files.config import load_plan
     from sdimu_calibration.storage.files.effect_file import extended_model
 
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in extended_model(model, ()).effects]
+    effects = [selection.resolve(e) for e in extended_model(model, ()).effects]
     units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
     stops = 0 if plan is None else len(load_plan(plan).dwell_s)
     return Outline(duration, stops, [effect.key for effect in effects], units)

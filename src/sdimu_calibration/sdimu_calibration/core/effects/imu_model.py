@@ -133,7 +133,7 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
     `effects`: registered names, or effects of one's own; `imu`: gives the priors: by effect name, else the effect's own
     for the IMU's grade.
     """
-    chosen = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in effects])
+    chosen = told_apart([selection.resolve(e) for e in effects])
     _check_priors(chosen, imu)
     seen: set[str] = set()
     channel: list[int] = []

@@ -11,9 +11,11 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Work
 
 
-def resolve(text: str) -> Effect:
-    """Find the effect that `text` names."""
-    key = parse_key(text)
+def resolve(named: str | Effect) -> Effect:
+    """Find the effect that `named` names; an effect, as of a file of the user's own, is itself."""
+    if isinstance(named, Effect):
+        return named
+    key = parse_key(named)
     refuse_size(key)
     effect, parameters = _find(key.name)
     if key.options:

@@ -32,7 +32,7 @@ def stable_effects(model: Model, varying: Collection[str]) -> list[Effect]:
     varying : collection of str
         Names of the effects that may differ from power-on to power-on.
     """
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in model.effects]
+    effects = [selection.resolve(e) for e in model.effects]
     stable = [e for e in effects if e.scope == "unit" and (e.family or e.name) not in varying]
     # The key of a coefficient alone is what a recording is fitted with.
     return [e for e in stable if e.group != REFERENCES and not e.file]

@@ -182,7 +182,7 @@ def _of_all(effects: Sequence[str | Effect], job: Job) -> tuple[str, ...]:
     own = {label for key in job.local for label in selection.resolve(key).labels}
     kept: list[str | Effect] = []
     for effect in effects:
-        whole = selection.resolve(effect) if isinstance(effect, str) else effect
+        whole = selection.resolve(effect)
         kept += [effect] if own.isdisjoint(whole.labels) else map(by_name, without(whole, own))
     return cast("tuple[str, ...]", tuple(kept))
 
@@ -205,7 +205,7 @@ def _untagged(about: Mapping[str, float], name: str) -> dict[str, float]:
 def _report(job: Job, fit: Fit) -> Report:
     name, recording = job.member.name, fit.test.recording
     tried_in_all = _of_all(job.candidates, job)
-    shared = [selection.resolve(e) if isinstance(e, str) else e for e in tried_in_all]
+    shared = [selection.resolve(e) for e in tried_in_all]
     own = _local_candidates(fit) if job.with_local else []
     rivals: tuple[InOneNoise, ...] = ()
     if job.stretches:
@@ -301,5 +301,5 @@ def _local_names(job: Job) -> set[str]:
     Beside another variant that all recordings have it is not the plain one.
     """
     shared = _of_all(job.model.effects, job)
-    effects = told_apart([selection.resolve(e) if isinstance(e, str) else e for e in (*shared, *job.local)])
+    effects = told_apart([selection.resolve(e) for e in (*shared, *job.local)])
     return {p.name for effect in effects[len(shared) :] for p in effect.parameters}

@@ -353,7 +353,7 @@ def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str
     names : sequence of str
         Coefficients that the estimator has.
     """
-    effects = {e.family or e.name: e for e in (resolve(e) if isinstance(e, str) else e for e in model.effects)}
+    effects = {e.family or e.name: e for e in map(resolve, model.effects)}
     for name, scope in scopes.items():
         if name not in effects or scope not in SCOPES:
             raise DataError(

@@ -298,7 +298,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
     """Effects that all recordings may lack, without the parameters that the model has."""
     report = max(fit.reports, key=lambda r: len(r.times.stops))
     heat = all(r.has_temperature for r in fit.reports)
-    have = {label for e in fit.model.effects for label in (selection.resolve(e) if isinstance(e, str) else e).labels}
+    have = {label for e in fit.model.effects for label in selection.resolve(e).labels}
     have |= set(fit.names)
     effects = [*extra, *(e for e in catalogue(report.times, have, heat, of_a_set=True) if is_shared(e)), *finer]
     if any(r.estimator == HandheldFit.estimator for r in fit.reports):

@@ -104,7 +104,7 @@ def next_recording(fit: SetFit, standing: Standing, test: PreparedTest) -> list[
     stay = Plan("next", (_REST_S,), (), _ACCELERATION_RAD_S2)
     found = []
     for members in standing.open:
-        effects = [selection.resolve(e) if isinstance(e, str) else e for e in fit.model.effects]
+        effects = [selection.resolve(e) for e in fit.model.effects]
         have = {label for e in effects for label in e.labels}
         added = [label for label in standing.added if label not in have and label not in members]
         asked = Question(test.site, test.imu, with_effects(fit.model, added), standing.known)

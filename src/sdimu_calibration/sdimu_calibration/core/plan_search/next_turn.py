@@ -114,7 +114,7 @@ def next_turn(
 
 def named_class(alike: Sequence[str | Effect]) -> tuple[list[Effect], tuple[str, ...]]:
     """Find the effects that are to be told apart, and the names of their coefficients. `alike`: as for `next_turn`."""
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
+    effects = [selection.resolve(e) for e in alike]
     names = tuple(p.name for e in effects for p in e.parameters)
     if len(names) < 2:
         raise DataError("nothing to tell apart: name two coefficients or more")
@@ -132,7 +132,7 @@ def untold(ranked: Sequence[NextTurn], alike: Sequence[str | Effect]) -> str:
     """
     if max((one.after for one in ranked), default=0.0) >= _NOTHING:
         return ""
-    effects = [selection.resolve(e) if isinstance(e, str) else e for e in alike]
+    effects = [selection.resolve(e) for e in alike]
     names = " and ".join(str(e) if isinstance(e, str) else e.name for e in alike)
     heat = any(e.needs == "temperature" for e in effects)
     why = ": a plan is foreseen at one temperature, and only a change of temperature tells them" if heat else ""
@@ -170,8 +170,7 @@ def in_sigmas(*values: float) -> list[str]:
 
 
 def _parameters(effect: str | Effect) -> tuple[str, ...]:
-    found = selection.resolve(effect) if isinstance(effect, str) else effect
-    return tuple(p.name for p in found.parameters)
+    return tuple(p.name for p in selection.resolve(effect).parameters)
 
 
 def _extras(rates: Sequence[float]) -> list[tuple[Turn, ...]]:
