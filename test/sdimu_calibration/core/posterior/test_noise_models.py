@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
+from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
-from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
+from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, SHIFT, STOP, TRIADS, TURN, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import (
     ODDS,
     SENSORS,
     SHARE,
     NoiseModel,
+    every_kind,
     explored,
     instead_of,
+    log_odds,
     usual_sizes,
 )
 from sdimu_calibration.storage.files.config import load_imu
@@ -104,12 +106,12 @@ def test_what_is_told_of_a_triad_does_not_hang_on_the_noise_of_the_other(cut, us
                     assert both[triad, term.kind] == pytest.approx(alone[triad, term.kind], abs=0.04)
 
 
-def seen_through_gyros(rng, cut, usual):
-    """Shifts of the accelerometers beside flicker of the gyros thirty times white noise, which tilts what they see."""
+def seen_through_gyros(rng, cut, usual, strong=FLICKER):
+    """Shifts of the accelerometers beside noise of the gyros thirty times white noise, which tilts what they see."""
     n = len(cut)
     level = [usual.centre[triad, FLICKER] for triad in TRIADS]
     sizes = [30.0 * level[0], 3.0 * usual.centre["accel", SHIFT]]
-    roots = [np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(n)) for kind in (FLICKER, SHIFT)]
+    roots = [np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(n)) for kind in (strong, SHIFT)]
     tilts = 0.3 * level[1] / level[0] * rng.choice([-1.0, 1.0], (n, 1)) * np.tril(np.ones((n, n))) / n
     H = np.block([[np.eye(n) / level[0], np.zeros((n, n))], [tilts / level[1], np.eye(n) / level[1]]]) / 0.5
     J, d = np.zeros((n, 2, 3, n, 2, 3)), np.zeros((n, 2, 3))
@@ -128,6 +130,30 @@ def test_noise_of_one_triad_is_found_beside_strong_noise_of_the_other(cut, usual
     found = told(information, cut, usual)
     assert found["gyro", FLICKER] > 0.9
     assert found["accel", SHIFT] > 0.5
+
+
+def test_kinds_in_the_place_of_strong_noise_are_sized_beside_the_noise_that_is_there(cut, usual):
+    """A random walk and Markov noise as long as the test look the same, however strong: both are told as open."""
+    open_ = 0
+    for seed in range(4):
+        information = seen_through_gyros(np.random.default_rng(seed), cut, usual, RANDOM_WALK)
+        found = explored(information, cut, usual)
+        likeliest = {triad: [t for t in found[0][1].terms if t.triad == triad] for triad in TRIADS}
+        assert len(likeliest["gyro"]) == 1
+        assert likeliest["accel"]
+        told = {t.identity for _, noise in found for t in noise.terms}
+        given = information.of_triad("gyro", likeliest["accel"], cut)
+        score = {}
+        for term in (t for t in every_kind(cut) if t.triad == "gyro"):
+            size, gain = InModes.of(given, cut, term.kind, term.tau).sizes_on_grid(term.axes)
+            share = np.exp(gain + usual.log_density(term, size) - gain.max())
+            log_mass = np.log(share.sum() * np.log(size[1] / size[0]))
+            markov = sum(t.kind == MARKOV for t in every_kind(cut)) // 2
+            score[term.identity] = gain.max() + log_mass + log_odds(markov)[term.kind]
+        near = {kind for kind, one in score.items() if one > max(score.values()) - 4.0}
+        open_ += len(near) - 1
+        assert near <= told
+    assert open_ > 0
 
 
 def test_the_likeliest_noise_without_terms_like_effects_is_found_where_all_others_have_some(cut, usual):

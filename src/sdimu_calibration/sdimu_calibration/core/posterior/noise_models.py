@@ -277,6 +277,17 @@ class _Search:
         found = replace(term, size=float(size[best]), gain=float(gain[best]))
         return found, self.log_odds[term.kind] + log_mass - float(gain[best])
 
+    def without(self, best: _Found, place: int) -> _Found:
+        """Leave one term out for another one in its place: the others keep the sizes that they have beside it.
+
+        Sized without it they take up what it made, and whatever comes in its place looks worse than it is.
+        """
+        triad, fewer = best.noise.terms[place].triad, _without(best.noise, place)
+        found = _Found(fewer, self.information.of_triad(triad, fewer.terms, self.cut).gain)
+        if found.score > best.score - _BEHIND:
+            self.settled(fewer.terms)
+        return found
+
     def crossed(self, best: _Found) -> None:
         """Combine what may stand in the place of the terms of each triad: the triads are nearly independent.
 
@@ -439,9 +450,8 @@ def explored(
     for _ in range(_MOST_STEPS):
         for place, term in enumerate(best.noise.terms):
             if len(best.noise.terms) > 1:
-                others = search.settled([t for k, t in enumerate(best.noise.terms) if k != place])
                 # Nothing in the other triad takes the place of a term: `crossed` puts the triads together.
-                search.one_more(others, (term.triad,))
+                search.one_more(search.without(best, place), (term.triad,))
         if not search.best().score > best.score + _SETTLED:
             break
         best = search.settled(search.best().noise.terms)
