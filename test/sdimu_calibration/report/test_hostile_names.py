@@ -19,7 +19,8 @@ from sdimu_calibration.core.results import SetRecording, SetSummary
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.coefficients import prior_and_posterior
 from sdimu_calibration.report.drawing import Figure
-from sdimu_calibration.report.fleet.figures import dot_plot, heat_map
+from sdimu_calibration.report.fleet.dots import dot_plot
+from sdimu_calibration.report.fleet.figures import heat_map
 from sdimu_calibration.report.noise import CHANNELS, write_page
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.storage.files.config import config_folder
@@ -119,7 +120,7 @@ def test_a_cross_in_the_map_of_a_fleet_stands_where_its_unit_does(hostile, monke
 
     drawn = []
     monkeypatch.setattr(fleet_page, "heat_map", lambda done: drawn.append(heat_map(done)) or drawn[-1])
-    monkeypatch.setattr(fleet_page, "dot_plot", lambda done: drawn.append(dot_plot(done)) or drawn[-1])
+    monkeypatch.setattr(fleet_page, "dot_plot", lambda *given: drawn.append(dot_plot(*given)) or drawn[-1])
     fleet([hostile], out=hostile)
     (cells,) = (figure for figure in drawn if figure.data[0]["type"] == "heatmap")
     for cross in cells.layout["annotations"]:

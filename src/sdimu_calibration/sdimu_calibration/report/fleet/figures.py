@@ -1,4 +1,4 @@
-"""Figures of a fleet: heat map of deviates, control charts over dates."""
+"""Figures of a fleet: heat map of deviates, control charts over dates; its dots are in `dots`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.fleet.population import Coefficient, Measured
 from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.units import from_si
@@ -51,49 +50,6 @@ def heat_map(done: Study) -> Figure:
     figure.y_axes(autorange="reversed", automargin=True, type="category")
     figure.x_axes(type="category", side="top")
     return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 70, "b": 20})
-
-
-def dot_plot(done: Study) -> Figure:
-    """Draw a dot for each unit in each coefficient, in spreads of the units from their mean; a cross is out."""
-    people = done.people
-    out = {(one.unit, one.coefficient) for one in people.out}
-    figure = Figure()
-    for is_out, symbol, size, ink in ((False, "circle-open", 9, AFTER), (True, "x", 11, BEFORE)):
-        dots = [
-            (one.name, unit, float(value))
-            for one in people.coefficients
-            for unit, value in zip(people.units, _in_spreads(one), strict=True)
-            if ((unit, one.name) in out) == is_out
-        ]
-        figure.add(
-            "scatter",
-            x=np.array([value for _, _, value in dots]),
-            y=[literal(name) for name, _, _ in dots],
-            text=[literal(unit) for _, unit, _ in dots],
-            mode="markers+text" if is_out else "markers",
-            textposition="top center",
-            marker={"symbol": symbol, "size": size, "color": ink, "line": {"width": 2}},
-            hovertemplate="%{text}<br>%{y}: %{x:.2f} spreads<extra></extra>",
-        )
-    names = [literal(one.name) for one in people.coefficients]
-    figure.shape("line", x0=0.0, x1=0.0, line={"color": INK, "width": 1}, opacity=1)
-    # Above: thirty coefficients reach below the first screen.
-    figure.x_axes(title="unit less mean of the units (spreads between units)", side="top")
-    figure.y_axes(
-        autorange="reversed",
-        automargin=True,
-        type="category",
-        categoryorder="array",
-        categoryarray=names,
-        title="coefficient",
-    )
-    return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 60, "b": 20})
-
-
-def _in_spreads(one: Coefficient) -> Floats:
-    """Values of the units less their mean, over the spread between units; where none is seen, over their errors."""
-    size = one.between.spread if one.between.spread > 0.0 else float(np.sqrt(np.mean(one.sigmas**2)))
-    return (one.values - one.between.mean) / size
 
 
 def control_chart(fleet: Measured, some: Sequence[Coefficient], units: Mapping[str, str], heading: str) -> Figure:

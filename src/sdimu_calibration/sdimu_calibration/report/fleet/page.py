@@ -11,7 +11,8 @@ from sdimu_calibration.core.fleet.study import Candidates, Study
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.fleet import tables
-from sdimu_calibration.report.fleet.figures import control_chart, dot_plot, heat_map
+from sdimu_calibration.report.fleet.dots import dot_plot
+from sdimu_calibration.report.fleet.figures import control_chart, heat_map
 from sdimu_calibration.report.groups import title as words_of
 from sdimu_calibration.report.markup import grid, prose, quiet, section
 from sdimu_calibration.storage.files.fleet_folder import Gathered
@@ -66,8 +67,13 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
     parts = [
         section(
             "Every unit in every coefficient",
-            quiet("A dot for each unit, in spreads from the mean of the units; a cross with its name: out."),
-            html(dot_plot(done), 0),
+            quiet(
+                "A dot for each unit, in spreads from the mean of the units"
+                + (" that are not out" if done.people.out else "")
+                + "; with its name: beyond the control limits (dashed, 3 spreads)"
+                + ("; a cross or a filled arrow: out." if done.people.out else ".")
+            ),
+            html(dot_plot(done, units), 0),
         ),
         _coefficients(done, units),
         section(
