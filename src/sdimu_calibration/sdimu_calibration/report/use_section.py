@@ -115,7 +115,7 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
             ):
                 _line(made, drift.t[rows], values[rows], f"{drift.name}|{unit}", (ink, dash), (row, column))
             if np.isfinite(drift.promised).any():
-                name = f"{drift.name}, promised|m"
+                name = f"{drift.name}, predicted|m"
                 _line(made, drift.t[rows], drift.promised[rows], name, (ink, dash), (1, column), 0.9)
     for row, title in enumerate(("position (m)", "velocity (m/s)", "heading (arcmin)"), start=1):
         made.y_axes(type="log", title=title, dtick=1, exponentformat="power", row=row, col=1)

@@ -1,6 +1,6 @@
 // Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
 (function () {
-  var LARGE = 1.5, NEAR = '400px', CELL = 29, BAR = 80, NOTABLE = 3, queue = [], library = null;
+  var LARGE = 1.5, NEAR = '400px', CELL = 27, WIDE = 33, BAR = 80, NOTABLE = 3, queue = [], library = null;
   // Width of a digit below a map and what keeps labels apart; least height of the map of a first screen (px).
   var DIGIT = 8, APART = 8, LEAST = 250;
 
@@ -45,11 +45,14 @@
     return figure;
   }
 
-  // Numbers stand in the cells of a map where they fit; where they do not, the sign of what stands out, and all on hover.
+  // Numbers stand in the cells of a map where they fit, smaller in cells that are not WIDE (px); where they do not, the
+  // sign of what stands out, and all on hover.
   function fitNumbers(figure, width) {
     var room = width - figure.layout.margin.l - figure.layout.margin.r - BAR;
     figure.data.forEach(function (trace) {
-      if (trace.type !== 'heatmap' || !trace.texttemplate || !(room / trace.x.length < CELL)) { return; }
+      var cell = room / trace.x.length;
+      if (trace.type !== 'heatmap' || !trace.texttemplate || !(cell < WIDE)) { return; }
+      if (cell >= CELL) { trace.textfont.size *= cell / WIDE; return; }
       trace.text = trace.text.map(function (row) {
         return row.map(function (text) { return Math.abs(Number(text.replace('\u2212', '-'))) >= NOTABLE ? text.charAt(0) : ''; });
       });

@@ -1,0 +1,63 @@
+"""Heat maps of a long plan in Chromium: a number is in its cell, or a sign is, on every width of a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sdimu_calibration.report import data
+from sdimu_calibration.report.design.sheet import document
+from sdimu_calibration.report.drawing import html
+from sdimu_calibration.report.evidence_figures import deviates, heat_map
+
+STOPS = 28
+"""Stops of the longest plan that the repository holds."""
+APART_PX = 3.0
+"""Least distance of numbers in neighbouring cells (px): they do not read as one."""
+
+_MAPS = """() => Array.from(document.querySelectorAll('.figure')).map(place => {
+    const figure = place.querySelector('.js-plotly-plot'), layout = figure._fullLayout;
+    const texts = Array.from(figure.querySelectorAll('.heatmap-label text, .heatmaplayer text'))
+        .filter(e => e.textContent.trim());
+    return {
+        cell: layout.xaxis._length / 28,
+        widest: Math.max(0, ...texts.map(e => e.getBoundingClientRect().width)),
+        longest: Math.max(0, ...texts.map(e => e.textContent.trim().length)),
+        least: Math.min(...texts.map(e => parseFloat(getComputedStyle(e).fontSize)))
+    };
+})"""
+"""Of each map: width of a cell, width and length of its widest number, size of the smallest one (px)."""
+
+
+@pytest.fixture
+def maps(tmp_path: Path) -> Path:
+    """A page with the two maps of a report that count stops: by channel, and by coefficient."""
+    rng = np.random.default_rng(1)
+    value = rng.normal(0.0, 2.0, (12, STOPS))
+    value[0, 3], value[3, 5] = -25.0, 8.4
+    names = [f"gyro_mass_unbalance_d{axis}" for axis in "xyz"]
+    figures = (
+        heat_map(data.Grid(np.arange(STOPS), value)),
+        deviates([str(k) for k in range(STOPS)], names, rng.normal(0.0, 4.0, (3, STOPS)), "stop", "coefficient", 300),
+    )
+    body = "".join(html(figure, k) for k, figure in enumerate(figures))
+    (tmp_path / "maps.html").write_text(document("Maps", body), encoding="utf-8")
+    return tmp_path / "maps.html"
+
+
+@pytest.mark.parametrize("width", [800, 1024, *range(1080, 1321, 40), 1440, 1920, 3840])
+def test_no_number_is_wider_than_its_cell(browser: Any, maps: Path, width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(maps.as_uri())
+    page.evaluate("sdimuDrawAll()")
+    found = page.evaluate(_MAPS)
+    page.close()
+    assert len(found) == 2
+    for one in found:
+        assert 0.0 < one["widest"] <= one["cell"] - APART_PX, one
+        # Where only signs stand, numbers would not have fitted; what is written can be read.
+        assert one["longest"] > 1 or one["cell"] < 29.0, one
+        assert one["least"] >= 9.5, one
