@@ -153,12 +153,14 @@ def ranking(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
     )
     top = max([abs(s.z) for s in shown] + [threshold])
-    figure.x_axes(title="score |z| (sigma)", range=[0, 1.3 * top])
+    figure.x_axes(title="score |z| (sigma)", range=[0, _BESIDE * top])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
+_BESIDE = 1.55
+"""Width of the axis of candidates as a multiple of the longest bar: its size stands beside it in a window of 800 px."""
 _FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
 """Ink of a bar by what its effect acts on."""
 _ASIDE = 0.45

@@ -96,7 +96,7 @@ def distribution(found: Whiteness) -> Figure:
     )
     figure.x_axes(title="innovation (sigma)", col=1)
     figure.y_axes(title="density (1/sigma)", col=1)
-    figure.x_axes(title="quantile of the normal distribution (sigma)", col=2)
+    figure.x_axes(title="normal quantile (sigma)", col=2)
     figure.y_axes(title="quantile found (sigma)", col=2)
     return lay_out(figure, 380, showlegend=True, legend=_LEGEND, margin={"l": 70, "r": 20, "t": 80, "b": 55})
 
