@@ -17,6 +17,7 @@ THOROUGH = {
     "test/sdimu_calibration/core/diagnosis/test_unknown_attitude.py": "diagnoses of several rounds",
     "test/recovery/test_faults.py": "every fault of the data at every size",
     "test/recovery/test_grades.py": "every IMU file, from samples to result",
+    "test/sdimu_calibration/api/test_typed.py": "runs mypy over the package",
     "test/test_wheels.py": "builds and unpacks the wheels",
     "test/sdimu_calibration/cli/test_terminal.py": "every verb in a window of another size",
     "test/sdimu_calibration/report/workbench/test_speed.py": "times the workbench",

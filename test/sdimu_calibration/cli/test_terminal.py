@@ -17,7 +17,8 @@ from unittest import mock
 import pytest
 
 from sdimu_calibration.cli import main as cli
-from sdimu_calibration.cli.next_commands import Asked, spelled
+from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.next_commands import Asked, print_advice, spelled
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -239,7 +240,8 @@ def test_advice_repeats_what_was_asked_for():
     words = shlex.join(full.options)
     assert words == "--site s --model m --noise estimated --estimator filter --serial 7 --hand --add x"
     ranked = Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, ("a", "b"))
-    assert sentence(ranked) == "Turns ranked by what they tell: sdimu plan --plan YOURS --tell 'a' --tell 'b'."
+    stated = "(PLAN: name in config/plan, or file, of the plan that the table ran)."
+    assert sentence(ranked) == f"Turns ranked by what they tell: sdimu plan --plan PLAN --tell 'a' --tell 'b' {stated}"
     command = spelled(ranked, asked)
     assert shlex.split(command) == [
         "sdimu",
@@ -259,9 +261,12 @@ def test_advice_repeats_what_was_asked_for():
     assert sentence(more).endswith("turn X; for a whole plan: sdimu plan --after.")
     assert spelled(more, asked) == "sdimu plan --after out"
     back = Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)
-    assert sentence(back).endswith("The other order: sdimu plan --plan YOURS --backwards.")
+    assert sentence(back).endswith(f"The other order: sdimu plan --plan PLAN --backwards {stated}")
     assert shlex.split(spelled(back, asked))[2:4] == ["--plan", "out/plan.yaml"]
-    # Where no plan was seen there is no such file.
-    unseen = shlex.split(spelled(back, replace(asked, has_plan=False)))
-    assert unseen[2:4] == ["--plan", "PLAN_OF_THIS_TEST.yaml"]
+    # Where no plan was seen there is no such file: words say which one is meant.
+    unseen = replace(asked, has_plan=False)
+    assert spelled(back, unseen) == ""
+    with redirect_stdout(StringIO()) as said:
+        print_advice(plain(), [ranked], unseen)
+    assert " ".join(said.getvalue().split()) == f"advice: {sentence(ranked)}"
     assert spelled(Advice(Kind.LOOK_AT_MOUNT), asked) == ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
@@ -16,6 +16,7 @@ from sdimu_calibration.report.unknown_section import followed
 
 if TYPE_CHECKING:
     import pandas as pd
+    from plotly.graph_objects import Figure as Live
 
 
 def _size(member: MemberShare) -> tuple[float, float]:
@@ -69,7 +70,7 @@ class Diagnosed(ABC):
         made: pd.DataFrame = needed("pandas").DataFrame(rows, columns=columns)
         return made.sort_values("probability", ascending=False, kind="stable").set_index("effect")
 
-    def plot_unknown(self) -> tuple[Any, ...]:
+    def plot_unknown(self) -> tuple[Live, ...]:
         """Each error of `unknown` against what it follows, with its 95 % band (plotly figures)."""
         return tuple(followed(one).as_plotly() for one in self.unknown)
 

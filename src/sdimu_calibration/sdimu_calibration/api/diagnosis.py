@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Literal, overload
 
+from sdimu_calibration.api.advice_in_python import in_python
 from sdimu_calibration.api.diagnosed import Diagnosed
-from sdimu_calibration.api.figure_library import Library, drawn
+from sdimu_calibration.api.figure_library import Either, Library, drawn
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.diagnosis.plan_seen import as_plan
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
@@ -18,6 +20,8 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
@@ -28,10 +32,15 @@ from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
+from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 from sdimu_calibration.storage.trace import traced
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Printed
+    from plotly.graph_objects import Figure as Live
 
 
 class FitDiagnosis(Diagnosed):
@@ -77,8 +86,33 @@ class FitDiagnosis(Diagnosed):
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do next, one sentence each."""
-        return tuple(map(sentence, self.summary.advice))
+        """What to do next, one sentence each, with the calls that do it; `fit` is what was diagnosed, `found` this."""
+        speech = in_python(self.plan is not None)
+        return tuple(sentence(one, speech) for one in self.summary.advice)
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan as the motion showed it; None where a turn was about several axes, or none was."""
+        return as_plan(self.summary.plan)
+
+    def turns(self, *effects: str, plan: str | Plan | None = None) -> tuple[NextTurn, ...]:
+        """Rank turns after those of the test by what they tell effects apart, the most a minute first.
+
+        Parameters
+        ----------
+        *effects : str
+            Two coefficients or more, as `--tell` of `sdimu plan` takes them.
+        plan : str or Plan, optional
+            The plan that the table ran: name in config/plan, path, or the plan itself; that which the motion showed
+            where it is left out.
+        """
+        start = load_plan(plan) if isinstance(plan, str) else plan or self.plan
+        if start is None:
+            raise DataError("turns(...): the motion shows no plan; state that which the table ran: plan=...")
+        given = self.core.fit
+        if given.test.site is None:
+            raise DataError("turns(...): the test has no site, at which turns could be foreseen")
+        return next_turn(start, Question(given.test.site, given.test.imu, given.model), effects)
 
     @property
     def known(self) -> Standing:
@@ -90,7 +124,11 @@ class FitDiagnosis(Diagnosed):
         """Errors that no effect explains and that follow attitude, rate or temperature: mean and sigma by stretch."""
         return unknown_of(self.core)
 
-    def plot_ranking(self, library: Library = "plotly") -> Any:
+    @overload
+    def plot_ranking(self, library: Literal["plotly"] = ...) -> Live: ...
+    @overload
+    def plot_ranking(self, library: Literal["matplotlib"]) -> Printed: ...
+    def plot_ranking(self, library: Library = "plotly") -> Either:
         """Scores of the candidates against what noise reaches (a figure of plotly or matplotlib)."""
         self._drawable(library)
         return drawn(library, self._ranking, "candidates", self.core)
@@ -114,7 +152,11 @@ class FitDiagnosis(Diagnosed):
             data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
         )
 
-    def plot_heat_map(self, library: Library = "plotly") -> Any:
+    @overload
+    def plot_heat_map(self, library: Literal["plotly"] = ...) -> Live: ...
+    @overload
+    def plot_heat_map(self, library: Literal["matplotlib"]) -> Printed: ...
+    def plot_heat_map(self, library: Library = "plotly") -> Either:
         """Mean residual of every channel at every stop over its sigma (a figure of plotly or matplotlib).
 
         Of the model as given; matplotlib draws that with what was found below it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.plain_text import printable
@@ -11,10 +11,16 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.extras import needed
 from sdimu_calibration.report.drawing import Figure
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Printed
+    from plotly.graph_objects import Figure as Live
+
 Library = Literal["plotly", "matplotlib"]
+Either: TypeAlias = "Live | Printed"
+"""A figure of either library, where the name of the library is not known before the program runs."""
 
 
-def drawn(library: Library, made: Callable[[], Figure], picture: str, diagnosis: Diagnosis) -> Any:
+def drawn(library: Library, made: Callable[[], Figure], picture: str, diagnosis: Diagnosis) -> Either:
     """Return a figure in a library: `made` by plotly, or the `picture` of a diagnosis (`report.pictures`)."""
     if library == "plotly":
         return made().as_plotly()
@@ -23,4 +29,5 @@ def drawn(library: Library, made: Callable[[], Figure], picture: str, diagnosis:
     # It loads matplotlib, which is optional.
     pictures = needed("sdimu_calibration.report.pictures")
     with pictures.mpl.rc_context(pictures.STYLE):
-        return getattr(pictures, picture)(diagnosis)
+        printed: Printed = getattr(pictures, picture)(diagnosis)
+    return printed

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sdimu_calibration.api.advice_in_python import IN_PYTHON_OF_A_SET
 from sdimu_calibration.api.diagnosed import Diagnosed
 from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.core.effects.effect import Effect
@@ -151,8 +152,8 @@ class JointDiagnosis(Diagnosed):
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """What to do next, one sentence each."""
-        return tuple(map(sentence, self.core.advice))
+        """What to do next, one sentence each, with the calls that do it; `set` is what was opened."""
+        return tuple(sentence(one, IN_PYTHON_OF_A_SET) for one in self.core.advice)
 
     @property
     def known(self) -> Standing:

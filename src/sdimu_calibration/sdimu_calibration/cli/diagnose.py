@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdimu_calibration.cli.console import answer, plain, say
-from sdimu_calibration.cli.next_commands import PLAN, PLAN_SHOWN, Asked, as_plan, check_plan_room, spelled
+from sdimu_calibration.cli.next_commands import PLAN, PLAN_SHOWN, Asked, check_plan_room, spelled
 from sdimu_calibration.cli.opened import default_folder, explained, leave, opened, printing, tell
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
@@ -57,6 +57,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
     from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
+    from sdimu_calibration.core.diagnosis.plan_seen import as_plan
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.report.cost import held_to_use
@@ -124,6 +125,7 @@ class Findings:
 
 def _write(what: Findings, trace: Trace) -> None:
     """Leave diagnosis.json, result.json and report.html."""
+    from sdimu_calibration.core.diagnosis.plan_seen import as_plan
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.files.plan_file import write_plan

@@ -12,18 +12,15 @@ from sdimu_calibration.cli.option_groups import words_by_option, words_of
 from sdimu_calibration.cli.options import Fitted, Place
 from sdimu_calibration.core.advice import Verb
 from sdimu_calibration.shell_words import joined
-from sdimu_calibration.storage.files.advice_words import EXCLUDE, added, lead, plan_options
+from sdimu_calibration.storage.files.advice_words import EXCLUDE, added, lead, plan_options, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from sdimu_calibration.core.advice import Advice
-    from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
-    from sdimu_calibration.core.plan import Plan
 
 PLAN = "plan.yaml"
 """File beside a diagnosis: the plan as the motion showed it."""
-_OWN_PLAN = "PLAN_OF_THIS_TEST.yaml"
 PLAN_SHOWN, PLAN_RUN, PLAN_CHOSEN = "The plan as the motion showed it", "The plan that was run", "The turns chosen for"
 """How the remark begins at the head of a plan that a verb leaves with its results: a new one may replace it."""
 TO_LEARN = "To learn what the model misses:"
@@ -33,8 +30,6 @@ NOT_LOOKED_FOR = (
     "of its sigmas. To look:"
 )
 """What is said before it where the model fits: a calibration cannot know more without a misfit."""
-_ACCELERATION = 1.0
-"""Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 _FIRST = ("site", "imu", "model", "noise", "estimator")
 """Options that a command names first; the others stand as their groups have them."""
 
@@ -73,7 +68,7 @@ class Asked:
 
 
 def spelled(advice: Advice, asked: Asked) -> str:
-    """Write the whole command that an advice means about what was asked; empty where it means none.
+    """Write the whole command that an advice means about what was asked; empty where it means none, or lacks the plan.
 
     What is to be kept becomes a calibration of the recording; a plan is that which was seen, at the same site and with
     the same IMU.
@@ -89,9 +84,10 @@ def spelled(advice: Advice, asked: Asked) -> str:
     if advice.verb == Verb.CONTINUE:
         return joined(["sdimu", "plan", "--after", str(asked.folder)])
     if advice.verb in {Verb.REVERSE_PLAN, Verb.RANK_TURNS}:
-        # Where the motion showed no plan, the user has the one that the table ran.
-        plan = str(asked.folder / PLAN) if asked.has_plan else _OWN_PLAN
-        return f"sdimu plan {joined(['--plan', plan, *asked.place])} {plan_options(advice)}"
+        # Where the motion showed no plan, words have to say which one the user states.
+        if not asked.has_plan:
+            return ""
+        return f"sdimu plan {joined(['--plan', str(asked.folder / PLAN), *asked.place])} {plan_options(advice)}"
     return ""
 
 
@@ -120,27 +116,6 @@ def print_advice(console: Console, advice: Sequence[Advice], asked: Asked) -> No
     """Print each advice, its command on a line of its own."""
     for one in advice:
         whole = spelled(one, asked)
-        say(console, f"advice: {lead(one)}{':' if whole else ''}")
+        say(console, f"advice: {lead(one)}:" if whole else f"advice: {sentence(one)}")
         if whole:
             command(console, whole)
-
-
-def as_plan(seen: PlanSeen | None) -> Plan | None:
-    """Write the plan that was seen as a plan to begin with; None where a turn was about several axes, or none was.
-
-    Angles are rounded to whole degrees and rates to tenths: the motion tells them to the mount and the scale factors.
-    """
-    import math
-
-    from sdimu_calibration.core.plan import Plan, Turn
-
-    if seen is None or not seen.turns or any(turn.axis is None for turn in seen.turns):
-        return None
-    dwell = max(1.0, round(60.0 * seen.dwell_minutes))
-    turns = []
-    for turn in seen.turns:
-        angle, rate = round(math.degrees(turn.angle)), round(abs(math.degrees(turn.rate)), 1)
-        if not angle or not rate or turn.axis is None:
-            return None
-        turns.append(Turn("XYZ"[turn.axis], math.radians(angle), math.radians(rate)))
-    return Plan("seen", (dwell,) * (len(turns) + 1), tuple(turns), _ACCELERATION)

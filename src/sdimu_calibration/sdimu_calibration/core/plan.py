@@ -38,6 +38,10 @@ class Plan:
         """Length of the whole test (s)."""
         return sum(self.dwell_s) + sum(t.duration_s for t in self.turns)
 
+    def backwards(self) -> Plan:
+        """Return the plan in the opposite order; as the function `backwards`."""
+        return backwards(self)
+
 
 def backwards(plan: Plan) -> Plan:
     """Return a plan with the stops and turns in the opposite order, every turn in the other sense.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from sdimu_calibration.extras import needed
 from sdimu_calibration.report.design.library import as_script
 from sdimu_calibration.report.design.palette import LIGHT, paint
 from sdimu_calibration.report.design.plotly_template import template
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure as Live
 
 BEFORE, AFTER, BEFORE_PALE = "@before", "@after", "@before_pale"
 BAND, PALE, INK, MUTED = "@band", "@pale", "@ink", "@muted"
@@ -151,10 +154,11 @@ class Figure:
             },
         )
 
-    def as_plotly(self, theme: str = LIGHT) -> Any:
+    def as_plotly(self, theme: str = LIGHT) -> Live:
         """Return it as a `plotly.graph_objects.Figure`, for a notebook or the workbench."""
         # Slow to load, and reports do without.
-        return needed("plotly.graph_objects").Figure(self.content(theme))
+        made: Live = needed("plotly.graph_objects").Figure(self.content(theme))
+        return made
 
     def content(self, theme: str = LIGHT) -> Any:
         """Return it as plotly.js takes it, in a theme: quick, because nothing checks it."""

@@ -17,7 +17,6 @@ from sdimu_calibration.cli.next_commands import (
     PLAN_CHOSEN,
     PLAN_RUN,
     Asked,
-    as_plan,
     check_plan_room,
     print_advice,
     spelled,
@@ -393,6 +392,7 @@ def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary
 
     `part`: where files are written that then go to `out` together.
     """
+    from sdimu_calibration.core.diagnosis.plan_seen import as_plan
     from sdimu_calibration.storage.files.config import load_plan
     from sdimu_calibration.storage.files.plan_file import write_plan
 

@@ -32,7 +32,7 @@ from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.noise_term import MARKOV, NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.posterior.told import Share
-from sdimu_calibration.storage.files.advice_words import _WORDS, sentence
+from sdimu_calibration.storage.files.advice_words import _SPOKEN, _WORDS, sentence
 from sdimu_calibration.storage.files.advice_words import lead as words_before_command
 from sdimu_calibration.storage.files.effect_file import find_effects
 
@@ -95,7 +95,8 @@ def test_nothing_found_gives_no_advice():
 
 
 def test_every_kind_of_advice_has_words():
-    assert set(_WORDS) == set(Kind)
+    assert set(_WORDS) | set(_SPOKEN) == set(Kind)
+    assert not set(_WORDS) & set(_SPOKEN)
 
 
 def test_what_is_likely_is_tried_and_not_kept():

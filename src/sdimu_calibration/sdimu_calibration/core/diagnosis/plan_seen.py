@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import AXES
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.plan import Plan, Turn
 
 _SINGLE_AXIS = 0.9
 """Share of a turn about one body axis from which it is a turn about that axis: one about two axes at once has 0.71 of
@@ -15,6 +17,8 @@ it about either."""
 _OBLIQUE = 0.35
 """Share of gravity along the second largest of the body axes from which a stop leans: 20 deg, more than any mount is
 off."""
+_ACCELERATION = 1.0
+"""Angular acceleration (rad/s^2) of a plan that was seen: the motion does not tell the limit, and no sum needs it."""
 _RATES_DIFFER = 1.5
 """Ratio of two rates from which they differ: measured rates of one command do not scatter by so much."""
 
@@ -89,3 +93,20 @@ def plan_seen(evidence: NavigationEvidence) -> PlanSeen:
         oblique += int(share[1] > _OBLIQUE)
     dwell = float(np.median([b - a for _, a, b in times.stops])) / 60.0 if times.stops else 0.0
     return PlanSeen(tuple(turns), oblique, dwell)
+
+
+def as_plan(seen: PlanSeen | None) -> Plan | None:
+    """Write the plan that was seen as a plan to begin with; None where a turn was about several axes, or none was.
+
+    Angles are rounded to whole degrees and rates to tenths: the motion tells them to the mount and the scale factors.
+    """
+    if seen is None or not seen.turns or any(turn.axis is None for turn in seen.turns):
+        return None
+    dwell = max(1.0, round(60.0 * seen.dwell_minutes))
+    turns = []
+    for turn in seen.turns:
+        angle, rate = round(math.degrees(turn.angle)), round(abs(math.degrees(turn.rate)), 1)
+        if not angle or not rate or turn.axis is None:
+            return None
+        turns.append(Turn("XYZ"[turn.axis], math.radians(angle), math.radians(rate)))
+    return Plan("seen", (dwell,) * (len(turns) + 1), tuple(turns), _ACCELERATION)

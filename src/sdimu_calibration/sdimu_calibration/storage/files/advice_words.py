@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.plain_text import capital
@@ -12,16 +13,37 @@ EXCLUDE = "--exclude-times"
 """Option that leaves times out."""
 
 
-def sentence(advice: Advice) -> str:
-    """Return an advice as one sentence, its command included."""
-    command = general_command(advice)
+@dataclass(frozen=True)
+class Speech:
+    """How users start what an advice means: in a shell or in Python."""
+
+    command: Callable[[Advice], str]
+    """Writes the command of an advice."""
+    together: str
+    """Diagnose several recordings as one unit."""
+    alone: str
+    """Diagnose one recording."""
+    attempt: str
+    """Try an effect of one's own."""
+    site: str
+    """State the site."""
+    backwards: str
+    """Put the plan into another order."""
+
+
+def sentence(advice: Advice, speech: Speech | None = None) -> str:
+    """Return an advice as one sentence, its command included; `speech`: that of a shell where it is left out."""
+    said = speech or SHELL
+    command = said.command(advice)
     if not command:
-        return lead(advice)
-    return f"{lead(advice)}: {command}."
+        return lead(advice, said)
+    return f"{lead(advice, said)}: {command}."
 
 
-def lead(advice: Advice) -> str:
-    """Return the words of an advice, without the command at their end."""
+def lead(advice: Advice, speech: Speech | None = None) -> str:
+    """Return the words of an advice, without the command at their end; `speech`: as of `sentence`."""
+    if advice.kind in _SPOKEN:
+        return _SPOKEN[advice.kind](speech or SHELL, *advice.arguments)
     return _WORDS[advice.kind](*advice.arguments)
 
 
@@ -40,7 +62,19 @@ def general_command(advice: Advice) -> str:
     if advice.verb == Verb.CUT:
         end, begin = advice.about
         return f"sdimu bag cut BAG --to {end} --out FIRST; sdimu bag cut BAG --from {begin} --out SECOND"
-    return f"sdimu plan --plan YOURS {plan_options(advice)}"
+    return f"sdimu plan --plan PLAN {plan_options(advice)} ({PLAN_IS})"
+
+
+PLAN_IS = "PLAN: name in config/plan, or file, of the plan that the table ran"
+"""What stands for a plan in a command, where nothing of the recording names it."""
+SHELL = Speech(
+    general_command,
+    "sdimu diagnose FIRST SECOND",
+    "sdimu diagnose BAG",
+    "sdimu diagnose BAG --try FILE",
+    "--site",
+    f"sdimu plan --plan PLAN --backwards; {PLAN_IS}",
+)
 
 
 def added(advice: Advice) -> str:
@@ -66,12 +100,12 @@ def _unknown(stop: int | None, channel: str, learned: bool) -> str:
     return f"Something unknown acts{place}: coefficients of this test are no better than their scatter."
 
 
-def _latitude(off: float, sigma: float) -> str:
+def _latitude(said: Speech, off: float, sigma: float) -> str:
     off_deg, sigma_deg = (math.degrees(v) for v in (off, sigma))
     sense = "North" if off_deg > 0.0 else "South"
     return (
         f"Look at the site: its latitude is {abs(off_deg):.2f} +- {sigma_deg:.2f} deg too far {sense}; correct it "
-        "there (--site) rather than add the effect."
+        f"there ({said.site}) rather than add the effect."
     )
 
 
@@ -108,28 +142,12 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         "outliers when the tails are heavy."
     ),
     Kind.UNKNOWN_CAUSE: _unknown,
-    Kind.RECORD_MORE: lambda: (
-        "One recording more lets one of the effects stand out, or all fall: record the unit again, and diagnose all "
-        "recordings together (sdimu diagnose FIRST SECOND)."
-    ),
-    Kind.RUN_BACKWARDS: lambda: (
-        "Run the plan again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
-        "that says whether it comes back at the same attitude, time or temperature, or is of this run. The other order"
-    ),
-    Kind.RECORD_IN_OTHER_ORDER: lambda: (
-        "Record the run again in another order, and diagnose both recordings together (sdimu diagnose FIRST SECOND): "
-        "that says whether it comes back at the same attitude, time or temperature, or is of this run."
-    ),
-    Kind.TRY_EQUATION: lambda *labels: (
-        f"Try an equation of your own (--try FILE); nearest in this test: {', '.join(labels)}."
-    ),
     Kind.KEEP: lambda label: _keep(label or "what was found"),
     Kind.TRY: lambda label: (
         f"It is open which effect it is: record more before you keep {label}. What it changes"
         if label
         else "Of some it is open which effect it is. Record more before you keep them. What they change"
     ),
-    Kind.CORRECT_LATITUDE: _latitude,
     Kind.RECORD_AGAIN: lambda label: f"{label} is a fault of this recording: record again and do not carry it over.",
     Kind.TELL_APART: _apart,
     Kind.RANK_TURNS: lambda: "Turns ranked by what they tell",
@@ -162,13 +180,6 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.COME_BACK: lambda: "come back to the first attitudes at the end, and rest there",
     Kind.TURN_BOTH_WAYS: lambda: "turn about that axis both ways, slowly and fast",
     Kind.REST_BETWEEN: lambda: "rest in more attitudes between the axes, both ends of that axis up",
-    Kind.REVERSE_AND_ADD: lambda: (
-        "Record the plan in another order (sdimu plan --plan YOURS --backwards), and diagnose it with these."
-    ),
-    Kind.TRY_FORCE_EQUATION: lambda: (
-        "What comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation of "
-        "the specific force (sdimu diagnose BAG --try FILE)."
-    ),
     Kind.BEGIN_LATER: lambda: (
         "What comes back at the same time ends when the unit is warm: begin the plan later, or make the first stop "
         "longer."
@@ -200,9 +211,36 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"No single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
         "are needed): search a whole plan for the next recording"
     ),
-    Kind.ONE_BY_ONE: lambda: (
-        "Diagnose the recordings one by one (sdimu diagnose BAG), the one with the largest deviates first."
-    ),
     Kind.FIND_EFFECT: lambda: "Find which effect is missing",
     Kind.FIND_SMALLER: lambda: "Find out whether smaller effects are missing",
 }
+
+_SPOKEN: dict[Kind, Callable[..., str]] = {
+    Kind.RECORD_MORE: lambda said: (
+        "One recording more lets one of the effects stand out, or all fall: record the unit again, and diagnose all "
+        f"recordings together ({said.together})."
+    ),
+    Kind.RUN_BACKWARDS: lambda said: (
+        f"Run the plan again in another order, and diagnose both recordings together ({said.together}): "
+        "that says whether it comes back at the same attitude, time or temperature, or is of this run. The other order"
+    ),
+    Kind.RECORD_IN_OTHER_ORDER: lambda said: (
+        f"Record the run again in another order, and diagnose both recordings together ({said.together}): "
+        "that says whether it comes back at the same attitude, time or temperature, or is of this run."
+    ),
+    Kind.TRY_EQUATION: lambda said, *labels: (
+        f"Try an equation of your own ({said.attempt}); nearest in this test: {', '.join(labels)}."
+    ),
+    Kind.CORRECT_LATITUDE: _latitude,
+    Kind.REVERSE_AND_ADD: lambda said: (
+        f"Record the plan in another order ({said.backwards}), and diagnose it with these."
+    ),
+    Kind.TRY_FORCE_EQUATION: lambda said: (
+        "What comes back at the same attitude is an error of the sensor that the catalogue lacks: try an equation of "
+        f"the specific force ({said.attempt})."
+    ),
+    Kind.ONE_BY_ONE: lambda said: (
+        f"Diagnose the recordings one by one ({said.alone}), the one with the largest deviates first."
+    ),
+}
+"""Words that name a command within; the first argument says how."""
