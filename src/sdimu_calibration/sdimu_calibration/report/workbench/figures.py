@@ -171,7 +171,9 @@ def _title(curve: Curve, fitted: Fitted, used: Bools, channel: int, stop: int | 
     y = curve.y[used, channel]
     if not len(y):
         return f"{named}: {'left out' if stop in _left(fitted) else 'not measured'}"
-    return f"{named}: mean {y.mean():+.2f} sigma".replace("-", "\N{MINUS SIGN}")
+    # The map beside it has the mean over the sigma of a mean: said, as the two numbers differ by the root of the count.
+    of = f"mean of {len(y)} points" if len(y) > 1 else "one point"
+    return f"{named}: {of} {y.mean():+.2f} sigma".replace("-", "\N{MINUS SIGN}")
 
 
 def _left(fitted: Fitted) -> set[int]:
