@@ -17,6 +17,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.table import Step
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_sim.core.scenario import Scenario, generate
@@ -165,6 +166,49 @@ def test_no_turn_leads_to_one_that_the_table_cannot_make_after_it():
     assert "leads to" not in choice.reason
 
 
+def level_fit() -> FilterFit:
+    """Fit where y and z were upright both ways, and x never was."""
+    turns = tuple(Turn("X", math.radians(90.0), math.radians(10.0)) for _ in range(4))
+    return perfect_fit(Plan("x level", (30.0,) * 5, turns, ACCELERATION))
+
+
+def level_known(minutes: float) -> tuple[Knowledge, Goals]:
+    """What is known of `level_fit` where the accelerometers' scale factors alone have a limit."""
+    fit = level_fit()
+    sigma = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
+    limit = 1.1 * max(sigma["accel_scale_y"], sigma["accel_scale_z"])
+    goals = Goals("accelerometers", {"accel_scale": limit}, minutes)
+    return fitted(fit, goals), goals
+
+
+def first_about_x(*steps: Step) -> bool:
+    """Say what a table can do that turns about x alone from where it stands, and from there about any axis."""
+    return steps[0].turn.axis == "X"
+
+
+def test_a_limit_that_takes_two_turns_is_no_end_of_a_test():
+    # About x alone the accelerometer x stays level; after a quarter turn about x a turn about z makes it upright.
+    known, goals = level_known(30.0)
+    assert [name for name, ratio in zip(known.limited, known.ratio, strict=True) if ratio > 1.0] == ["accel_scale_x"]
+    choice = choose(known, goals, SHORT, 27.0, first_about_x)
+    assert isinstance(choice, Choice)
+    assert choice.step.turn.axis == "X"
+    assert abs(math.degrees(choice.step.turn.angle_rad)) == pytest.approx(90.0)
+    assert "leads to" in choice.reason
+    assert "accel_scale_x" in choice.reason
+    after = choose(known, goals, SHORT, 27.0 - choice.minutes, at=choice.after)
+    assert isinstance(after, Choice)
+    assert after.step.turn.axis in "YZ"
+    assert after.gain > 1.0
+
+
+def test_two_turns_are_looked_for_only_where_one_leaves_a_limit_out_of_reach():
+    known, goals = level_known(30.0)
+    asked = []
+    choose(known, goals, SHORT, 27.0, lambda *steps: asked.append(len(steps)) or True)
+    assert set(asked) == {1}
+
+
 def test_what_the_goals_ask_is_told_apart_though_nothing_was_found():
     wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
     fit = perfect_fit(BOTH_SENSES)
@@ -176,6 +220,24 @@ def test_what_the_goals_ask_is_told_apart_though_nothing_was_found():
     assert isinstance(choice, Choice)
     assert choice.step.turn.axis == "Y"
     assert f"tells {PAIR[0]} from {PAIR[1]}" in choice.text
+
+
+@pytest.mark.parametrize(("ratio", "left", "goes_on"), [(1.02, 20.0, True), (300.0, 0.5, False), (0.9, 20.0, False)])
+def test_a_class_that_cannot_be_told_apart_ends_no_test_whose_limits_are_near(ratio, left, goes_on, monkeypatch):
+    fit = perfect_fit(BOTH_SENSES, PAIR[:1])
+    worst = float(with_open(fit, GOALS, PAIR).ratio.max())
+    goals = replace(GOALS, limits={name: limit * worst / ratio for name, limit in GOALS.limits.items()})
+    known = with_open(fit, goals, PAIR)
+    # More than any turn brings: as of two effects with one equation.
+    never = replace(known, open=replace(known.open, needed=np.array([1e9])))
+    monkeypatch.setattr("sdimu_calibration.core.adaptive.choice._NOTHING_NAT", math.inf)
+    chosen = choose(never, goals, SHORT, left, lambda *steps: len(steps) == 1)
+    assert isinstance(chosen, Choice) == goes_on
+    if goes_on:
+        assert (chosen.ratio <= known.ratio + 1e-9).all()
+        assert np.maximum(chosen.ratio, 1.0).prod() < np.maximum(known.ratio, 1.0).prod()
+    else:
+        assert f"{PAIR[0]} is not told from {PAIR[1]}" in chosen.reason
 
 
 def test_what_two_rates_in_both_senses_tell_apart_is_lacking_no_longer():

@@ -11,7 +11,7 @@ import numpy as np
 from sdimu_calibration.core.adaptive.goals import Goals
 from sdimu_calibration.core.adaptive.knowledge import Knowledge
 from sdimu_calibration.core.adaptive.menu import Menu
-from sdimu_calibration.core.adaptive.move import Move, Stand, length_s, moves, needed_of
+from sdimu_calibration.core.adaptive.move import Move, Stand, led, length_s, moves, needed_of
 from sdimu_calibration.core.adaptive.so_far import SoFar, ahead
 from sdimu_calibration.core.adaptive.worth import Worth, worth
 from sdimu_calibration.core.arrays import Floats
@@ -93,12 +93,42 @@ def choose(
     found = moves(stand)
     if not found:
         return End(f"the time is up; {_lacking(known, now)}", reached=False)
-    # What ends the test soonest comes first, then what brings most a minute.
-    best = min(found, key=lambda o: (not o.done, o.elapsed_s if o.done else -o.rate))
-    out_of_reach = most_gain(best.rate, goals.minutes, minutes_left) < now.lacking[0]
-    if not best.done and best.rate < _NOTHING_NAT and out_of_reach:
-        return End(f"no move of this table brings more; {_lacking(known, now)}", reached=False)
+    best = _best_of(found)
+    if known.open is None and not _within_reach(best, stand):
+        # Two turns may bring what no single one does; with a class open they were looked at.
+        best = _best_of([best, *led(stand)])
+    if best.rate < _NOTHING_NAT and not _within_reach(best, stand):
+        nearer = _to_limits(found, stand)
+        if nearer is None:
+            return End(f"no move of this table brings more; {_lacking(known, now)}", reached=False)
+        best = nearer
     return _choice(stand, best)
+
+
+def _best_of(found: list[Move]) -> Move:
+    """Choose what ends the test soonest, else what brings most a minute."""
+    return min(found, key=lambda o: (not o.done, o.elapsed_s if o.done else -o.rate))
+
+
+def _within_reach(best: Move, stand: Stand) -> bool:
+    """Whether moves like the best one could bring all that is lacking in the time that is left."""
+    most = most_gain(best.rate, stand.goals.minutes, stand.minutes_left)
+    return best.done or most >= stand.now.lacking[0]
+
+
+def _to_limits(found: list[Move], stand: Stand) -> Move | None:
+    """Choose what brings most a minute to the limits alone; None where they hold or are out of reach.
+
+    A class that no turn tells apart, such as a delay and a sensitivity to angular acceleration, ends no test whose
+    limits are near.
+    """
+    lacking = stand.now.beyond[0]
+    rate, best = max(
+        ((60.0 * (lacking - move.worth.beyond[move.row]) / move.elapsed_s, move) for move in found),
+        key=lambda one: float(one[0]),
+    )
+    near = most_gain(float(rate), stand.goals.minutes, stand.minutes_left) >= lacking > 0.0
+    return best if near else None
 
 
 def most_gain(rate: float, minutes: float, left: float) -> float:

@@ -82,11 +82,20 @@ def length_s(turn: Turn | None) -> float:
 def moves(stand: Stand) -> list[Move]:
     """List what can be done in the time that is left.
 
-    Where a class is open, what one turn hides from the next is looked for, too: an axis that stands upright shows
-    little of a slow turn about it, and the turn that brings it level shows nothing by itself.
+    Where a class is open, what one turn hides from the next is looked for, too (`led`): an axis that stands upright
+    shows little of a slow turn about it, and the turn that brings it level shows nothing by itself.
     """
     found = _from(stand, stand.at, None)
-    if stand.known.open is None or not stand.at.square:
+    return found if stand.known.open is None else found + led(stand)
+
+
+def led(stand: Stand) -> list[Move]:
+    """List moves after a turn that leads to them, none where the test stands between the axes.
+
+    A table cannot turn about every axis from everywhere: an attitude that a limit needs may be two turns away.
+    """
+    found: list[Move] = []
+    if not stand.at.square:
         return found
     turns = (Turn(axis, angle, stand.menu.rate_rad_s) for axis in "XYZ" for angle in _LEADING_RAD)
     for first in turns:

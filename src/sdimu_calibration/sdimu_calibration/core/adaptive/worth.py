@@ -32,6 +32,11 @@ class Worth:
     lacking: Floats
     """To all limits and to telling the class apart (nat), shape (k,)."""
 
+    @property
+    def beyond(self) -> Floats:
+        """What is lacking to the limits alone (nat), shape (k,)."""
+        return np.asarray(np.log(np.maximum(self.ratio, 1.0)).sum(axis=1))
+
     def reached(self, needed: Floats) -> Bools:
         """Say which covariances leave nothing lacking, shape (k,).
 
