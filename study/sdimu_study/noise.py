@@ -25,7 +25,7 @@ _INSTABILITY = {"gyro": to_si(0.01, "deg/h"), "accel": to_si(2.0, "ug")}
 """Bias instability (rad/s, m/s^2) where the IMU file states none: of navigation-grade sensors."""
 _TAUS_S = (100.0, 1000.0)
 """Range of the time constant of Markov noise (s)."""
-_RATES_HZ = (20.0, 50.0)
+RATES_HZ = (20.0, 50.0)
 """Sample rates that are drawn (Hz)."""
 _WALK_S = 1000.0
 """Averaging time (s) at which the Allan deviation of a random walk is the bias instability."""
@@ -46,7 +46,7 @@ class NoiseCase:
 def world(case: NoiseCase, seed: int) -> OneTest:
     """Simulate a test in noise of data-sheet size."""
     rng, imu = rng_of(seed, case.imu, case.kind), load_imu(case.imu)
-    (plan, site), rate_hz = drawn_place(rng, PLANS), float(rng.choice(_RATES_HZ))
+    (plan, site), rate_hz = drawn_place(rng, PLANS), float(rng.choice(RATES_HZ))
     noise = () if case.kind == WHITE else drawn_noise(imu, case.kind, rng)
     true = noise_terms(noise)
     span = (case.sigmas, case.sigmas)
