@@ -107,7 +107,6 @@ def test_marks_in_names_of_the_user_are_shown_and_not_obeyed():
     """Names of folders, effect files, coefficients and joints come from files of others."""
     name = 'own <b>bold</b> <a href="https://elsewhere">here</a>'
     figures = (
-        evidence_figures.rungs(["as given", name], [2.0, 1.0]),
         evidence_figures.correlation([name, "gyro_bias_x"], np.eye(2)),
         workbench_figures.ladder(["as given", name], [2.0, 1.0], [None, None]),
     )

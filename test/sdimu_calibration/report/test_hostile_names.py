@@ -147,7 +147,6 @@ def test_figures_of_effects_show_labels_as_they_are(hostile):
     part = data.Explained(IMAGE, np.arange(9.0), np.arange(9.0))
     figures = (
         evidence_figures.explained([part]),
-        evidence_figures.rungs([BOLD, IMAGE], [2.0, 1.0]),
         evidence_figures.correlation([BOLD, IMAGE], np.eye(2)),
         prior_and_posterior(one, dict.fromkeys(one.names, 1.0)),
         evidence_figures.deviates([BOLD], [IMAGE], np.ones((1, 1)), "recording", "coefficient", 300),

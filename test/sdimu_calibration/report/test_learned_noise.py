@@ -19,7 +19,6 @@ from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import first_screen, sections
-from sdimu_calibration.report.evidence_figures import rungs
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.files.result_file import as_note
@@ -89,13 +88,6 @@ def test_the_heat_map_says_in_which_noise_its_sigmas_are(learned, diagnosis):
     assert "white noise" in drawn
     assert "is chance" not in drawn
     assert "is chance" in sections.heat_maps(diagnosis, no_figure)
-
-
-def test_the_axis_of_the_ladder_says_in_which_noise_it_is():
-    titles = [rungs(("a", "b"), (7.0, 5.0), white=white).layout["xaxis"]["title"]["text"] for white in (True, False)]
-    assert "white noise" in titles[0]
-    assert "1 is right" not in titles[0]
-    assert "1 is right" in titles[1]
 
 
 def test_nothing_is_shown_with_what_was_found_where_nothing_was(learned, diagnosis):

@@ -46,7 +46,6 @@ def text(diagnosis: Diagnosis, more: ReportExtras) -> str:
 def all_figures(diagnosis: Diagnosis, more: ReportExtras) -> dict[str, object]:
     found = data.residuals(diagnosis)
     return {
-        "ladder": evidence_figures.rungs(*zip(*error_ladder(diagnosis), strict=True)),
         "ranking": evidence_figures.ranking(data.scored(diagnosis), diagnosis.found.threshold),
         "heat map": evidence_figures.heat_map(data.where(diagnosis.consistency)),
         "explained": evidence_figures.explained(data.explained(diagnosis)),

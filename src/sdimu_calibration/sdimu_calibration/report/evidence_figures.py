@@ -187,48 +187,6 @@ def _shares_in_words(entry: data.Scored, shares: Mapping[str, str]) -> str:
     return "; ".join([f", {shares.get(own, '')}", *others]) if others else ""
 
 
-def rungs(names: Sequence[str], values: Sequence[float], height: int = 300, white: bool = False) -> Figure:
-    """Draw how far the held-out error of each model is from 1, each with its name and number.
-
-    The axis holds what there is and not zero: beside it a fall of many sigmas looks flat. `white` says that noise with
-    a memory was learned, and that the errors are not in it.
-    """
-    figure = Figure()
-    names = [literal(name) for name in names]
-    for k, (name, value) in enumerate(zip(names, values, strict=True)):
-        color, symbol = (AFTER, "circle") if k else (BEFORE, "triangle-up")
-        figure.add(
-            "scatter",
-            x=[1.0, value],
-            y=[k, k],
-            mode="lines+markers",
-            line={"color": color, "width": 2},
-            marker={"size": [0, 12], "color": color, "symbol": symbol, "opacity": 1.0},
-            text=[name, name],
-            cliponaxis=False,
-            hovertemplate="%{text}: %{x:.3f} sigma<extra></extra>",
-        )
-    for k, (name, value) in enumerate(zip(names, values, strict=True)):
-        figure.annotate(
-            f"<b>{value:.3f}</b>  {name}",
-            x=0,
-            y=k,
-            xref="x domain",
-            xanchor="left",
-            yanchor="bottom",
-            yshift=8,
-            align="left",
-            bgcolor="@card",
-        )
-    figure.shape("line", x0=1.0, x1=1.0, line=_LIMIT)
-    known = [v for v in (*values, 1.0) if np.isfinite(v)]
-    room = max(0.08 * (max(known) - min(known)), 0.02)
-    title = "held-out error in white noise (sigma)" if white else "held-out error (sigma); 1 is right"
-    figure.x_axes(title=title, range=[min(known) - room, max(known) + room])
-    figure.y_axes(range=[len(names) - 0.6, -0.7], showticklabels=False, ticks="", showgrid=False, title="model")
-    return lay_out(figure, height, margin={"l": 30, "r": 25, "t": 10, "b": 50})
-
-
 def explained(parts: Sequence[data.Explained]) -> Figure:
     """Misfit against what each found effect predicts, binned means; on the diagonal when it is right."""
     figure = Figure(rows=1, cols=len(parts), titles=[literal(part.label) for part in parts], gap_x=0.1)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.table import Table
 
 from sdimu_calibration.core.noise import TERMS, Allan, Terms
 from sdimu_calibration.core.units import from_si
@@ -99,16 +98,6 @@ _STANDS_OUT = 1.5
 """Ratio of the deviation to that of the terms from which it is a peak: slopes between the terms' make less."""
 _PEAK = 0.371
 """Frequency times averaging time at the peak of the Allan deviation: of a sine (IEEE Std 952, annex C)."""
-
-
-def table(found: Mapping[str, Terms]) -> Table:
-    """Table of the terms for the terminal."""
-    made = Table(*HEAD, pad_edge=False, title="terms of the Allan deviation, one sigma")
-    made.columns[2].justify = made.columns[3].justify = "right"
-    listed = rows(found)
-    for k, row in enumerate(listed):
-        made.add_row(*row, end_section=k + 1 < len(listed) and listed[k + 1][0] != row[0])
-    return made
 
 
 def figure(deviations: Mapping[str, Allan], found: Mapping[str, Terms]) -> Figure:
