@@ -18,6 +18,7 @@ def test_the_table_has_all_groups_of_constants():
     assert {name.rpartition(".")[0] for name, _ in ROWS} >= {
         "posterior.prior",
         "posterior.noise_models",
+        "posterior.noise_search",
         "posterior.search",
         "posterior.posterior",
         "effects.usual",

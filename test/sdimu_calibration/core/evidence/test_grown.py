@@ -1,9 +1,13 @@
 """A matrix that grows: columns are put behind others without a copy, and nobody writes over another one's."""
 
+import gc
 import pickle
+import weakref
 
 import numpy as np
+import pytest
 
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.evidence.grown import NOT_GROWN, Grown, chosen
 
 RNG = np.random.default_rng(3)
@@ -55,3 +59,24 @@ def test_chosen_columns_are_each_in_one_piece():
     some = chosen(W, np.array([4, 1]))
     np.testing.assert_array_equal(some, W[:, [4, 1]])
     assert some.flags["F_CONTIGUOUS"]
+
+
+@pytest.mark.parametrize("turned", [np.s_[::-1], np.s_[:, ::-1], np.s_[5:]])
+def test_rows_and_columns_in_another_order_are_not_those_of_the_memory(turned):
+    begun = NOT_GROWN.beside(columns(4), columns(2))
+    here = begun.columns[turned]
+    more = RNG.normal(size=(len(here), 1))
+    np.testing.assert_array_equal(begun.beside(here, more).columns, np.hstack([here, more]))
+
+
+def test_an_evidence_of_fewer_columns_leaves_the_wide_matrix(bench):
+    """A search keeps evidences of few columns for long."""
+    wide = bench.fit().evidence([registry.get("accel_quadratic")]).with_effects([registry.get("gyro_delay")])
+    memory = weakref.ref(wide.grown.memory.whole)
+    few = wide.only(np.array([len(wide.weight) + 1]))
+    first = wide.only(np.arange(len(wide.weight), len(wide.weight) + 2))
+    assert few.grown == NOT_GROWN
+    assert first.grown == wide.grown
+    del wide, first
+    gc.collect()
+    assert memory() is None

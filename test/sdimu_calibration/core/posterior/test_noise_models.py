@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -17,11 +18,10 @@ from sdimu_calibration.core.posterior.noise_models import (
     SHARE,
     NoiseModel,
     every_kind,
-    explored,
-    instead_of,
     log_odds,
     usual_sizes,
 )
+from sdimu_calibration.core.posterior.noise_search import _Search, explored, instead_of
 from sdimu_calibration.storage.files.config import load_imu
 
 TRIED = tuple(NoiseTerm(triad, kind) for triad in TRIADS for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT))
@@ -154,6 +154,46 @@ def test_kinds_in_the_place_of_strong_noise_are_sized_beside_the_noise_that_is_t
         open_ += len(near) - 1
         assert near <= told
     assert open_ > 0
+
+
+def two_in_each(rng, cut, usual):
+    """Two terms in each triad, of one to twenty times their usual sizes, each triad by itself."""
+    n = len(cut)
+    J, error = np.zeros((n, 6)), np.zeros((n, 6))
+    for place, triad in enumerate(TRIADS):
+        axes = slice(3 * place, 3 * place + 3)
+        J[:, axes] = (2.0 * SHARE[FLICKER] / usual.centre[triad, FLICKER]) ** 2
+        for kind in rng.choice([RANDOM_WALK, FLICKER, STOP, TURN, SHIFT], 2, replace=False):
+            size = usual.centre[triad, kind] * 20.0 ** rng.random()
+            root = np.linalg.cholesky(kernel(str(kind), 0.0, cut) + 1e-12 * np.eye(n))
+            error[:, axes] += size * root @ rng.standard_normal((n, 3))
+    d = J * error + np.sqrt(J) * rng.standard_normal(J.shape)
+    return NoiseInformation(np.diag(J.ravel()), d.ravel(), 0.0)
+
+
+def test_no_pair_of_kinds_in_a_triad_is_far_better_than_what_is_found(cut, usual):
+    """Held against all pairs, each at its best sizes beside the likeliest noise of the other triad.
+
+    One term stands for two that are both missing: beside it neither is seen.
+    """
+    behind, passed_over, near = [], 0, 0
+    for seed in range(30):
+        information = two_in_each(np.random.default_rng(seed), cut, usual)
+        found = explored(information, cut, usual, TRIED)
+        (score, likeliest), told = found[0], {noise.kinds for _, noise in found}
+        search = _Search(information, cut, usual, TRIED)
+        for triad, kinds in product(TRIADS, combinations((RANDOM_WALK, FLICKER, STOP, TURN, SHIFT), 2)):
+            terms = [NoiseTerm(triad, kind, size=usual.centre[triad, kind]) for kind in kinds]
+            beside = [k for k, t in enumerate(likeliest.terms) if t.triad != triad]
+            every = (*(likeliest.terms[k] for k in beside), *terms)
+            shares = (*(likeliest.shares[k] for k in beside), 0.0, 0.0)
+            pair = search.settled(NoiseModel(every, shares), (triad,))
+            behind.append(score - pair.score)
+            near += pair.score > score - 3.0
+            passed_over += pair.score > score - 3.0 and pair.noise.kinds not in told
+    assert near > 100
+    assert min(behind) > -3.0
+    assert passed_over < 0.1 * near
 
 
 def test_the_likeliest_noise_without_terms_like_effects_is_found_where_all_others_have_some(cut, usual):

@@ -52,12 +52,24 @@ class Grown:
         whole[:, : here.shape[1]], whole[:, here.shape[1] : count] = here, more
         return Grown(_Memory(whole, [count]), count)
 
+    def holds(self, here: Floats) -> bool:
+        """Whether columns are the first ones of this memory.
+
+        Parameters
+        ----------
+        here : ndarray, shape (N, k)
+            Any unit.
+        """
+        if self.memory is None or here.base is not self.memory.whole:
+            return False
+        whole = self.memory.whole
+        begins = here.ctypes.data == whole.ctypes.data
+        return begins and here.strides == whole.strides and len(here) == len(whole)
+
     def _ends_with(self, here: Floats, count: int) -> bool:
         """Take the room behind some columns, up to `count`; whether they end the memory and it has so much."""
         memory = self.memory
-        if memory is None or here.base is not memory.whole or here.shape[1] != self.count:
-            return False
-        if count > memory.whole.shape[1]:
+        if memory is None or not self.holds(here) or here.shape[1] != self.count or count > memory.whole.shape[1]:
             return False
         try:
             memory.free.remove(self.count)

@@ -77,7 +77,9 @@ class LinearEvidence(ABC):
     """
 
     def __post_init__(self, worked_out: Information | None) -> None:
-        """Keep the information that is known."""
+        """Keep the information that is known, and no memory of other columns."""
+        if self.grown.memory is not None and not self.grown.holds(self.W):
+            object.__setattr__(self, "grown", NOT_GROWN)
         if worked_out is not None:
             object.__setattr__(self, "information", worked_out)
 

@@ -22,7 +22,8 @@ from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.models import Data, Members, gains
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, explored, instead_of, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, usual_sizes
+from sdimu_calibration.core.posterior.noise_search import explored, instead_of
 from sdimu_calibration.core.posterior.prior import UNKNOWN_SIZE, WIDTHS, Prior, prior_of
 
 _SHARPER = 1.0
