@@ -1,13 +1,14 @@
 """The next move is one that the table can make, brings most a minute, and says why; nothing is chosen for nothing."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.core.adaptive import Choice, End, Goals, Knowledge, Menu, aimed, choose, fitted, so_far
-from sdimu_calibration.core.adaptive.choice import most_gain
+from sdimu_calibration.core.adaptive.choice import _times, most_gain
 from sdimu_calibration.core.adaptive.knowledge import ratios
 from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
 from sdimu_calibration.core.adaptive.worth import worth
@@ -238,6 +239,37 @@ def test_a_class_that_cannot_be_told_apart_ends_no_test_whose_limits_are_near(ra
         assert np.maximum(chosen.ratio, 1.0).prod() < np.maximum(known.ratio, 1.0).prod()
     else:
         assert f"{PAIR[0]} is not told from {PAIR[1]}" in chosen.reason
+
+
+def test_beside_two_effects_with_one_equation_a_test_goes_on_to_a_limit_that_is_a_stop_away():
+    pair = ("gyro_delay_y", "gyro_acceleration_sensitivity_yy")
+    fit = perfect_fit(BOTH_SENSES, pair[:1])
+    worst = float(with_open(fit, GOALS, pair).ratio.max())
+    goals = replace(GOALS, limits={name: limit * worst / 1.0009 for name, limit in GOALS.limits.items()})
+    choice = choose(with_open(fit, goals, pair), goals, SHORT, 20.0)
+    assert isinstance(choice, Choice)
+    assert choice.ratio.max() < 1.0
+    told = re.fullmatch(r"brings \w+ from (\S+) to (\S+) of its limit", choice.reason)
+    assert told is not None, choice.reason
+    assert float(told[2]) < 1.0 < float(told[1])
+
+
+@pytest.mark.parametrize(
+    ("ratios", "written"),
+    [
+        ((50.2, 0.86), ["50 times", "0.86"]),
+        ((1.61, 1.04), ["1.61", "1.04"]),
+        ((1.0009, 0.998), ["1.001", "0.998"]),
+        ((1.0001, 0.998), ["1.0001", "0.9980"]),
+        ((1.0009, 1.0006), ["1.0009", "1.0006"]),
+        ((50.2, 0.998), ["50.2 times", "0.998"]),
+        ((50.2, 49.9), ["50.2 times", "49.9 times"]),
+        ((1.0009,), ["1.001"]),
+        ((1.0,), ["1.00"]),
+    ],
+)
+def test_a_reason_writes_as_many_digits_as_show_what_a_move_changes_and_on_which_side_of_the_limit(ratios, written):
+    assert _times(*ratios) == written
 
 
 def test_what_two_rates_in_both_senses_tell_apart_is_lacking_no_longer():

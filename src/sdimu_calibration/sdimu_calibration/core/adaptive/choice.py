@@ -23,6 +23,8 @@ _NOTHING_NAT = 0.02
 """Gain of the best move (nat/min) below which a test ends that cannot reach its limits: an hour would bring one."""
 _WORDS_NAT = 0.1
 """Gain (nat) from which a reason tells of a class: odds of 1.1 to 1."""
+_MORE_DIGITS = 4
+"""Digits that a reason may write a sigma over its limit in beyond the usual (1): a smaller difference tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ def _lacking(known: Knowledge, now: Worth) -> str:
     told = []
     worst = int(np.argmax(now.ratio[0]))
     if now.ratio[0, worst] > 1.0:
-        told.append(f"{known.limited[worst]} is at {_times(now.ratio[0, worst])} of its limit")
+        told.append(f"{known.limited[worst]} is at {_times(now.ratio[0, worst])[0]} of its limit")
     if known.open is not None:
         told.append(f"{known.open.found} is not told from {', '.join(known.open.alike)}")
     return " and ".join(told)
@@ -203,10 +205,16 @@ def _reason(known: Knowledge, best: Move, now: Worth) -> str:
             told.append(f"tells {known.open.found} from {known.open.alike[nearest]} ({lacked[nearest]:+.1f} nat)")
     if nat.max() > 0.0:
         i = int(np.argmax(nat))
-        from_to = f"from {_times(now.ratio[0, i])} to {_times(best.worth.ratio[best.row, i])} of its limit"
-        told.append(f"brings {known.limited[i]} {from_to}")
+        old, new = _times(now.ratio[0, i], best.worth.ratio[best.row, i])
+        told.append(f"brings {known.limited[i]} from {old} to {new} of its limit")
     return " and ".join(told) or "brings nothing"
 
 
-def _times(ratio: float) -> str:
-    return f"{ratio:.0f} times" if ratio > 9.5 else f"{ratio:.2f}"
+def _times(*ratios: float) -> list[str]:
+    """Write sigmas over a limit (1) in as many digits as show that they differ from each other and from the limit."""
+    written = []
+    for more in range(_MORE_DIGITS + 1):
+        written.append([f"{r:.{more}f} times" if r > 9.5 else f"{r:.{2 + more}f}" for r in ratios])
+        if len({*written[-1], f"{1.0:.{2 + more}f}"}) > len(ratios):
+            return written[-1]
+    return written[0]
