@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sdimu_calibration.cli.fleet import fleet
 from sdimu_calibration.core.fleet.population import measured
 from sdimu_calibration.core.fleet.study import Candidates, study
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.fleet.dots import dot_plot
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 NAMES = ("gyro_bias_x", "gyro_bias_y")
 UNITS = dict.fromkeys(NAMES, "deg/h")
@@ -87,3 +91,44 @@ def test_names_of_neighbours_stand_above_and_below():
     assert {unit for (unit, name), dot in dots.items() if dot[2] == "x" and name == "gyro_bias_x"} >= {"SN3", "SN9"}
     shifts = {one["text"]: one["yshift"] for one in figure.layout["annotations"]}
     assert shifts["SN3"] == -shifts["SN9"] != 0
+
+
+def lines_of(figure):
+    """Dashed control limits: (x, y0, y1)."""
+    return {(one["x0"], one["y0"], one["y1"]) for one in figure.layout["shapes"] if one["line"].get("dash") == "dash"}
+
+
+def test_a_coefficient_without_spread_has_no_control_limits(values):
+    # Control limits are mean +- 3 spreads: without a spread they are the mean, and no three errors from it.
+    values[:, 1] = 0.0
+    values[3, 1] = 0.0335
+    done = fleet_of(values)
+    assert [one.between.spread > 0.0 for one in done.inside.coefficients] == [True, False]
+    assert not done.people.out
+    figure, dots = dots_of(done)
+    assert lines_of(figure) == {(-3.0, -0.5, 0.5), (3.0, -0.5, 0.5)}
+    # More than three errors from the mean, and beyond no limit: no name.
+    assert dots["SN3", "gyro_bias_y"][1] > 3.0
+    assert figure.layout["annotations"] == []
+    words = {
+        (text.rpartition("<br>")[2].partition(":")[0], template.split()[1])
+        for trace in figure.data
+        for text, template in zip(trace["text"], trace["hovertemplate"], strict=True)
+    }
+    assert words == {("gyro_bias_x", "spreads"), ("gyro_bias_y", "errors")}
+
+
+def test_where_all_coefficients_spread_the_limits_are_as_high_as_the_figure(values):
+    assert lines_of(dots_of(fleet_of(values))[0]) == {(-3.0, 0, 1), (3.0, 0, 1)}
+
+
+def test_the_page_says_of_which_coefficients_there_are_no_limits(batch):
+    folder = batch(units=4)
+    fleet([folder])
+    assert "has no control limits" not in (folder / "fleet.html").read_text()
+    paths = sorted(folder.glob("*/result.json"))
+    one = read_result(paths[0])
+    for path in paths:
+        write_result(path, replace(read_result(path), values=one.values))
+    fleet([folder])
+    assert "no spread is seen has no control limits" in (folder / "fleet.html").read_text()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -33,13 +35,15 @@ class _Dot:
     told: str
     """Value and sigma in the customary unit."""
     out: bool
+    limited: bool
+    """Whether its coefficient has control limits: a spread between units is seen. `spreads` are errors where not."""
 
 
 def dot_plot(done: Study, units: Mapping[str, str]) -> Figure:
     """Draw a dot for each unit in each coefficient, in spreads from the mean of the units that are not out.
 
     A cross is out. Control limits are dashed; what lies beyond them has its name, and what is farther than the axis is
-    an arrow at its edge, with its distance.
+    an arrow at its edge, with its distance. A coefficient without a spread has no limits: they would be its mean.
 
     Parameters
     ----------
@@ -52,17 +56,17 @@ def dot_plot(done: Study, units: Mapping[str, str]) -> Figure:
     reach = max([_REACH, *(abs(dot.spreads) for dot in dots if abs(dot.spreads) <= _FARTHEST)])
     inside, out = [dot for dot in dots if not dot.out], [dot for dot in dots if dot.out]
     figure = Figure()
-    for x in (-CONTROL, CONTROL):
-        figure.shape("line", x0=x, x1=x, line={"color": BEFORE, "width": 1, "dash": "dash"}, opacity=1)
+    _limit(figure, [core.between.spread > 0.0 for core in done.inside.coefficients])
     figure.shape("line", x0=0.0, x1=0.0, line={"color": INK, "width": 1}, opacity=1)
     _draw(figure, inside, reach, symbol="circle-open", size=9, color=AFTER)
     _draw(figure, out, reach, symbol="x", size=11, color=BEFORE)
-    _name(figure, [dot for dot in dots if dot.out or abs(dot.spreads) > CONTROL], reach)
+    _name(figure, [dot for dot in dots if dot.out or (dot.limited and abs(dot.spreads) > CONTROL)], reach)
     names = [literal(one.name) for one in done.people.coefficients]
     # Above: thirty coefficients reach below the first screen.
     figure.x_axes(title="distance from the mean (spreads)", side="top", range=[-_ROOM * reach, _ROOM * reach])
     figure.y_axes(
-        autorange="reversed",
+        # By itself the axis would end at limits that are not of all rows. The first coefficient is on top.
+        range=[len(names) - 0.5, -0.5],
         automargin=True,
         type="category",
         categoryorder="array",
@@ -72,11 +76,29 @@ def dot_plot(done: Study, units: Mapping[str, str]) -> Figure:
     return lay_out(figure, max(_FEWEST_PX, _ROW * len(names) + 110), margin={"l": 200, "r": 20, "t": 60, "b": 20})
 
 
+def _limit(figure: Figure, limited: list[bool]) -> None:
+    """Draw control limits beside the coefficients that have some; `limited`: whether each has, from above."""
+    rows = 0
+    for has, run in groupby(limited):
+        first, rows = rows, rows + len(list(run))
+        # The first row is 0 and each reaches half a row to both sides.
+        height: dict[str, Any] = {} if all(limited) else {"y0": first - 0.5, "y1": rows - 0.5}
+        for x in (-CONTROL, CONTROL) if has else ():
+            figure.shape("line", x0=x, x1=x, line={"color": BEFORE, "width": 1, "dash": "dash"}, opacity=1, **height)
+
+
 def _dots(done: Study, units: Mapping[str, str]) -> list[_Dot]:
     """Measure each unit against the population without those that are out: what is out would widen its own scale."""
     out = {(one.unit, one.coefficient) for one in done.people.out}
     return [
-        _Dot(unit, one.name, (value - core.between.mean) / _scale(core), told, (unit, one.name) in out)
+        _Dot(
+            unit,
+            one.name,
+            (value - core.between.mean) / _scale(core),
+            told,
+            (unit, one.name) in out,
+            core.between.spread > 0.0,
+        )
         for one, core in zip(done.people.coefficients, done.inside.coefficients, strict=True)
         for unit, value, told in zip(done.people.units, one.values.tolist(), _told(one, units[one.name]), strict=True)
     ]
@@ -103,7 +125,10 @@ def _draw(figure: Figure, dots: list[_Dot], reach: float, symbol: str, size: int
         mode="markers",
         marker={"symbol": symbols, "size": size, "color": color, "line": {"width": 2}},
         cliponaxis=False,
-        hovertemplate="%{text}<br>%{customdata:.2f} spreads from the mean<extra></extra>",
+        hovertemplate=[
+            f"%{{text}}<br>%{{customdata:.2f}} {'spreads' if dot.limited else 'errors'} from the mean<extra></extra>"
+            for dot in dots
+        ],
     )
 
 

@@ -72,6 +72,7 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
                 + (" that are not out" if done.people.out else "")
                 + "; with its name: beyond the control limits (dashed, 3 spreads)"
                 + ("; a cross or a filled arrow: out." if done.people.out else ".")
+                + _without_spread(done)
             ),
             html(dot_plot(done, units), 0),
         ),
@@ -90,6 +91,16 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
     ]
     body = "\n".join(part for part in (told, *parts) if part)
     write_whole(path, document(title, body, under=prose(headline(gathered, done)), script=_SORT))
+
+
+def _without_spread(done: Study) -> str:
+    """Say of coefficients whose units do not differ that they have no control limits; empty where all differ."""
+    if all(one.between.spread > 0.0 for one in done.inside.coefficients):
+        return ""
+    return (
+        " A coefficient in which no spread is seen has no control limits: its distances are in errors of the units "
+        "(root mean square)."
+    )
 
 
 def _coefficients(done: Study, units: dict[str, str]) -> str:
