@@ -9,7 +9,9 @@ import pytest
 from plans import quick_plan
 
 import sdimu_calibration as sdimu
+from sdimu_calibration.core.plan_search import search
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.storage.files.config import find_config, load_imu, load_plan, load_site
 from sdimu_calibration.storage.files.plan_file import write_plan
 from sdimu_calibration.storage.files.result_file import read_result
 
@@ -198,6 +200,13 @@ def test_words_for_estimators_and_models_are_those_of_the_shell(bag):
     [
         (lambda: sdimu.plan("kim18", minutes=-3.0), "minutes=-3: a plan takes more than 0 minutes"),
         (lambda: sdimu.plan("kim18", slack=-1.0), "expected numbers above 0"),
+        (lambda: sdimu.plan(Path("kim18")), "kim18: no such plan file"),
+        (lambda: sdimu.plan(3), r"plan\(start=...\): expected a name in config/plan, a path, or a plan, not 3"),
+        (lambda: sdimu.plan(after="known"), r"plan\(after=...\): expected what `known` of a diagnosis is"),
+        (lambda: sdimu.plan(site=3), r"plan\(site=...\): expected a name in config/site"),
+        (lambda: sdimu.predict(Path("kim18")), "kim18: no such plan file"),
+        (lambda: sdimu.predict(sdimu.plan), r"predict\(plan=...\): expected a name in config/plan"),
+        (lambda: sdimu.predict(imu=7), r"predict\(imu=...\): expected a name in config/imu"),
         (lambda: sdimu.open_set([]), "no bag is named"),
         (lambda: sdimu.open("bag", imu=7), r"open\(imu=...\): expected a name in config/imu"),
     ],
@@ -210,3 +219,45 @@ def test_arguments_that_mean_nothing_are_refused_in_one_line(call, said):
 def test_one_effect_is_added_at_a_time(fit):
     with pytest.raises(DataError, match=r"add\(effect=...\): expected one effect"):
         fit.add(["accel_quadratic"])
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory) -> Path:
+    """A site with another height: gravity differs by less than the accelerometers tell."""
+    path = tmp_path_factory.mktemp("site") / "hill.yaml"
+    path.write_text(find_config("site", "daejeon").read_text().replace("height_m: 0.0", "height_m: 10.0"))
+    assert load_site(path) != load_site("daejeon")
+    return path
+
+
+def test_a_plan_after_a_recording_is_for_its_imu_at_its_site(bag, elsewhere, tmp_path, monkeypatch):
+    known = sdimu.diagnose(sdimu.calibrate(sdimu.open(bag, site=str(elsewhere), imu="fog_tactical"))).known
+    asked = []
+
+    def note(first, question, able, goal, tries, progress):
+        asked.append((question.imu, question.site))
+        return search(first, question, able, goal, tries, progress)
+
+    monkeypatch.setattr("sdimu_calibration.api.functions.search", note)
+    monkeypatch.chdir(tmp_path)
+    fog, dtg, here, there = load_imu("fog_tactical"), load_imu("dtg"), load_site("daejeon"), load_site(elsewhere)
+    for stated, meant in (
+        ({}, (fog, there)),
+        ({"imu": "dtg"}, (dtg, there)),
+        ({"site": "daejeon"}, (fog, here)),
+        ({"imu": dtg, "site": here}, (dtg, here)),
+    ):
+        sdimu.plan(quick_plan(), tries=1, after=known, **stated)
+        assert asked.pop() == meant
+
+
+def test_a_plan_after_nothing_is_for_the_usual_imu_at_the_usual_site(monkeypatch):
+    monkeypatch.setattr("sdimu_calibration.api.functions.search", lambda _first, question, *_: question)
+    asked = sdimu.plan(quick_plan())
+    assert (asked.imu, asked.site) == (load_imu("dtg"), load_site("daejeon"))
+
+
+def test_a_prediction_takes_names_and_objects_alike():
+    named = sdimu.predict("kim18", imu="fog_tactical")
+    given = sdimu.predict(load_plan("kim18"), imu=load_imu("fog_tactical"), site=load_site("daejeon"))
+    np.testing.assert_array_equal(given.sigma, named.sigma)

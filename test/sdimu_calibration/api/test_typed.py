@@ -21,7 +21,7 @@ print(found.verdict, *found.advice, value / sigma)
 found.plot_heat_map().write_html("map.html")
 found.plot_ranking(library="matplotlib").savefig("ranking.png")
 better = fit.add(found.best)
-print(better.to_dataframe(), *(turn.minutes for turn in found.turns("a", "b")))
+print(better.to_dataframe(), *(turn.minutes for turn in found.turns("a", "b")), found.plan.backwards())
 together = sdimu.diagnose(sdimu.calibrate(sdimu.open_set(["one", "two"])))
 """
 TOLD = {
@@ -29,7 +29,7 @@ TOLD = {
     "together": "sdimu_calibration.api.recording_set.JointDiagnosis",
     'found.plot_heat_map(library="matplotlib")': "matplotlib.figure.Figure",
     'found.plot_ranking(library="matplotlib")': "matplotlib.figure.Figure",
-    "found.plan": "sdimu_calibration.core.plan.Plan | None",
+    "found.plan": "sdimu_calibration.core.plan.Plan",
     "sdimu.compare(fit, better)": "sdimu_calibration.api.comparison.Comparison",
 }
 """Expressions and what mypy says they are. Figures of plotly are of no type to it: plotly has none."""

@@ -10,18 +10,20 @@ from sdimu_calibration.api.advice_in_python import in_python
 from sdimu_calibration.api.diagnosed import Diagnosed
 from sdimu_calibration.api.figure_library import Either, Library, drawn
 from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.api.given import plan_given
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.plan_seen import as_plan
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
+from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn
+from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn, untold
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
@@ -32,7 +34,6 @@ from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
-from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -87,32 +88,60 @@ class FitDiagnosis(Diagnosed):
     @property
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each, with the calls that do it; `fit` is what was diagnosed, `found` this."""
-        speech = in_python(self.plan is not None)
+        speech = in_python(self._seen is not None, self.core.fit.test.excluded)
         return tuple(sentence(one, speech) for one in self.summary.advice)
 
-    @property
-    def plan(self) -> Plan | None:
-        """The plan as the motion showed it; None where a turn was about several axes, or none was."""
+    @cached_property
+    def _seen(self) -> Plan | None:
+        """The plan as the motion showed it; None where it showed none."""
         return as_plan(self.summary.plan)
 
-    def turns(self, *effects: str, plan: str | Plan | None = None) -> tuple[NextTurn, ...]:
+    @property
+    def plan(self) -> Plan:
+        """The plan as the motion showed it.
+
+        Raises
+        ------
+        DataError
+            Where the motion showed none: by hand, without a turn, with one about several axes, or with one whose angle
+            or rate is rounded to zero.
+        """
+        if self._seen is None:
+            raise DataError(
+                "found.plan: the motion shows no plan (a run by hand, no turn, a turn about several axes, or one whose "
+                'angle or rate is rounded to zero); name that which the table ran: found.turns(..., plan="PLAN"), '
+                'sdimu.plan("PLAN"), or in a shell, sdimu plan --plan PLAN --backwards'
+            )
+        return self._seen
+
+    def turns(self, *effects: str | Effect, plan: str | Path | Plan | None = None) -> tuple[NextTurn, ...]:
         """Rank turns after those of the test by what they tell effects apart, the most a minute first.
 
         Parameters
         ----------
-        *effects : str
+        *effects : str or Effect
             Two coefficients or more, as `--tell` of `sdimu plan` takes them.
-        plan : str or Plan, optional
+        plan : str, Path or Plan, optional
             The plan that the table ran: name in config/plan, path, or the plan itself; that which the motion showed
             where it is left out.
+
+        Raises
+        ------
+        DataError
+            Where no turn tells them apart, where no plan is stated or seen, and where an argument is none of these.
         """
-        start = load_plan(plan) if isinstance(plan, str) else plan or self.plan
-        if start is None:
-            raise DataError("turns(...): the motion shows no plan; state that which the table ran: plan=...")
+        for one in effects:
+            if not isinstance(one, str | Effect):
+                raise DataError(f'turns(...): expected names of effects, such as turns("A", "B"), not {one!r:.60}')
+        start = self.plan if plan is None else plan_given("turns(plan=...)", plan)
         given = self.core.fit
         if given.test.site is None:
             raise DataError("turns(...): the test has no site, at which turns could be foreseen")
-        return next_turn(start, Question(given.test.site, given.test.imu, given.model), effects)
+        ranked = next_turn(start, Question(given.test.site, given.test.imu, given.model), effects)
+        none = untold(ranked, effects)
+        if none:
+            raise DataError(f"turns(...): {none}")
+        return ranked
 
     @property
     def known(self) -> Standing:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast, overload
 from sdimu_calibration.api.comparison import Comparison
 from sdimu_calibration.api.diagnosis import FitDiagnosis
 from sdimu_calibration.api.fit import CalibrationFit
+from sdimu_calibration.api.given import imu_given, plan_given, site_given
 from sdimu_calibration.api.recording_set import JointDiagnosis, JointFit, OpenedSet
 from sdimu_calibration.core.batch.batch import bound_covariance
 from sdimu_calibration.core.diagnosis.diagnose import climb
@@ -26,10 +27,10 @@ from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.planning.predict import predict as predict_test
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.specification import ImuSpecification, Site
 from sdimu_calibration.core.units import parse_quantity
 from sdimu_calibration.storage.arrays import raw_test
-from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_calibration.storage.files.effect_file import find_effects
 from sdimu_calibration.storage.files.model_choice import by_hand, named_estimator, named_model
 from sdimu_calibration.storage.opening import Opening, Source
@@ -233,17 +234,30 @@ def compare(*fits: CalibrationFit) -> Comparison:
     return Comparison(fits)
 
 
-def predict(plan: str | Plan = "kim18", imu: str = "dtg", site: str = "daejeon", model: str = "baseline") -> Prediction:
-    """Simulate the covariance of a test before it is run; names as for `sdimu predict`."""
-    chosen = load_plan(plan) if isinstance(plan, str) else plan
-    what = (chosen, load_site(site), load_imu(imu), named_model(model, []))
-    return predict_test(*what, bound=bound_covariance)
+def predict(
+    plan: str | Path | Plan = "kim18",
+    imu: str | Path | ImuSpecification = "dtg",
+    site: str | Path | Site = "daejeon",
+    model: str = "baseline",
+) -> Prediction:
+    """Simulate the covariance of a test before it is run.
+
+    Parameters
+    ----------
+    plan, imu, site
+        Name in config, path, or the object itself.
+    model : str
+        As for `sdimu predict`.
+    """
+    driven = plan_given("predict(plan=...)", plan)
+    at, sensors = site_given("predict(site=...)", site), imu_given("predict(imu=...)", imu)
+    return predict_test(driven, at, sensors, named_model(model, []), bound=bound_covariance)
 
 
 def plan(
-    start: str | Plan = "kim18",
-    imu: str = "dtg",
-    site: str = "daejeon",
+    start: str | Path | Plan = "kim18",
+    imu: str | Path | ImuSpecification | None = None,
+    site: str | Path | Site | None = None,
     model: str = "baseline",
     add: Sequence[str] = (),
     minutes: float | None = None,
@@ -256,9 +270,12 @@ def plan(
 
     Parameters
     ----------
-    start : str or Plan
-        Plan to begin with.
-    imu, site, model, add
+    start : str, Path or Plan
+        Plan to begin with: name in config/plan, path, or the plan itself.
+    imu, site : optional
+        Name in config, path, or the object itself; left out: those of `after`, else ``dtg`` and ``daejeon``. An IMU
+        that was opened as a specification of your own has no file that `after` could name: give it again.
+    model, add
         As for `sdimu plan`.
     minutes : float, optional
         Time there is: the best sigmas in it. Without: the shortest plan.
@@ -272,13 +289,17 @@ def plan(
         What is known already (`known` of a diagnosis): the plan that tells most beyond it, in the time of `start`
         where `minutes` are left out.
     """
-    first = load_plan(start) if isinstance(start, str) else start
+    first = plan_given("plan(start=...)", start)
     if after is not None:
-        wanted = named_model(model, [*after.added, *add])
-        asked = Question(load_site(site), load_imu(imu), wanted, after.known)
+        _expect("plan", "after", after, Standing, "what `known` of a diagnosis is")
+    stated = (imu or (after and after.imu) or "dtg", site or (after and after.site) or "daejeon")
+    sensors, at = imu_given("plan(imu=...)", stated[0]), site_given("plan(site=...)", stated[1])
+    if after is not None:
+        wanted = named_model(model, [*after.added, *_listed(add)])
+        asked = Question(at, sensors, wanted, after.known)
         goal = Goal({}, first.duration_s / 60.0 if minutes is None else minutes)
         return search(first, asked, _ABLE, goal, tries, progress)
-    asked = Question(load_site(site), load_imu(imu), named_model(model, add))
+    asked = Question(at, sensors, named_model(model, _listed(add)))
     limits = {effect: slack * sigma for effect, sigma in bounds(first, asked).largest().items()}
     return search(first, asked, _ABLE, Goal(limits, minutes), tries, progress)
 
