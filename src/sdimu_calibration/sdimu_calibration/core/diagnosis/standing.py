@@ -48,7 +48,7 @@ def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
 
 def _of_power_on(effect: str | Effect) -> tuple[str, ...]:
     """Coefficients of an effect that are others after the next switching-on."""
-    known = selection.resolve(effect) if isinstance(effect, str) else effect
+    known = selection.resolve(effect)
     return tuple(p.name for p in known.parameters) if known.scope == "power-on" else ()
 
 

@@ -13,7 +13,7 @@ from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.learned_noise import NoiseInformation
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import folded, spread
-from sdimu_calibration.core.evidence.taken import taken
+from sdimu_calibration.core.evidence.taken import Taken, taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
 
@@ -52,33 +52,16 @@ class Joint:
         """Information vector of the wander in white noise, shape (m,); in its inverse units (SI)."""
         return np.asarray(self.wander.U.across(self.evidence.e[:, None])[0])
 
-    def folded(self, terms: Sequence[NoiseTerm]) -> tuple[Floats, Floats]:
-        """Information on the modes of a noise, as `folded` makes it.
-
-        Returns
-        -------
-        M : ndarray, shape (r, r)
-            With what is known before the data (1).
-        y : ndarray, shape (r,)
-            (1).
-        """
-        M, y, _ = folded(self.wander.U.square, self.pull, terms, self.wander.cut)
-        return M, y
-
-    def spread(self, terms: Sequence[NoiseTerm], columns: Ints | slice = slice(None)) -> Floats:
-        """Information across columns of the evidence and the modes of a noise, as `spread` makes it.
+    def taken(self, terms: Sequence[NoiseTerm], columns: Ints | slice = slice(None)) -> Taken:
+        """Work out what the modes of a noise take of the information on columns of the evidence.
 
         Parameters
         ----------
         columns : ndarray of int, shape (k,), optional
             Of the evidence; all of them without.
-
-        Returns
-        -------
-        ndarray, shape (k, r)
-            Inverse units (SI) of the columns.
         """
-        return spread(self.across[columns], terms, self.wander.cut)
+        M, y, _ = folded(self.wander.U.square, self.pull, terms, self.wander.cut)
+        return taken(M, y, spread(self.across[columns], terms, self.wander.cut))
 
     def on_wander(self, known: Ints, weight: Floats) -> NoiseInformation:
         """Information on the wandering biases with some parameters estimated along.
@@ -98,5 +81,5 @@ class Joint:
 
     def in_noise(self, terms: Sequence[NoiseTerm]) -> Information:
         """Information on the columns of the evidence in noise of these terms."""
-        own, modes = self.evidence.information, taken(*self.folded(terms), self.spread(terms))
+        own, modes = self.evidence.information, self.taken(terms)
         return Information(own.J - modes.J, own.d - modes.d)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.evidence.information import solved
+from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.taken import taken
+from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
 from sdimu_calibration.core.posterior.board import Board, same_noise
@@ -100,8 +100,11 @@ def _in_one(joint: Joint, noise: NoiseModel) -> InOneNoise:
     evidence, own = joint.evidence, len(joint.evidence.weight)
     kept, others = kept_and_others(evidence)
     order = np.concatenate([kept, np.arange(own, len(evidence.names))])
-    log_det, explained = _taken(joint, noise)
-    full = joint.in_noise(noise.terms) if noise.terms else evidence.information
+    modes = joint.taken(noise.terms) if noise.terms else nothing_taken(len(evidence.names))
+    full = evidence.information
+    full = Information(full.J - modes.J, full.d - modes.d)
+    # Log determinant of the noise over white noise, and the sum of squares that it takes at the calibration.
+    log_det, explained = 2.0 * float(np.log(np.diag(modes.L)).sum()), float(modes.z @ modes.z)
     J, d = full.J[np.ix_(order, order)], full.d[order].copy()
     d[: len(kept)] -= evidence.weight[kept] * evidence.shift[kept]
     if len(others):
@@ -117,12 +120,3 @@ def _in_one(joint: Joint, noise: NoiseModel) -> InOneNoise:
     names = tuple(evidence.names[k] for k in order)
     squares, rows = float(evidence.e @ evidence.e), len(evidence.e)
     return InOneNoise(noise, names, np.arange(len(names)), J, d + J @ point, explained, log_det, squares, rows)
-
-
-def _taken(joint: Joint, noise: NoiseModel) -> tuple[float, float]:
-    """Log determinant of a noise over white noise, and the sum of squares that it takes at the calibration (1)."""
-    if not noise.terms:
-        return 0.0, 0.0
-    M, y = joint.folded(noise.terms)
-    modes = taken(M, y, np.zeros((0, len(y))))
-    return 2.0 * float(np.log(np.diag(modes.L)).sum()), float(modes.z @ modes.z)

@@ -17,7 +17,7 @@ from sdimu_calibration.core.evidence.information import Information, solved
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.noise_root import root_of
-from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken, taken
+from sdimu_calibration.core.evidence.taken import Taken, divided, nothing_taken
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -217,7 +217,7 @@ class Board(Generic[E]):
         J, d = full.J[np.ix_(keep, keep)], full.d[keep]
         if not noise.terms or self.joint is None or self.wander is None:
             return InNoise(J, d, np.zeros((0, 0)), nothing_taken(len(keep)))
-        modes = taken(*self.joint.folded(noise.terms), self.joint.spread(noise.terms, keep))
+        modes = self.joint.taken(noise.terms, keep)
         return InNoise(J - modes.J, d - modes.d, root_of(noise.terms, self.wander.cut), modes)
 
     def data(self, noise: NoiseModel) -> tuple[float, Data]:
