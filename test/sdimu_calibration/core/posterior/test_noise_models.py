@@ -192,6 +192,7 @@ def test_no_pair_of_kinds_in_a_triad_is_far_better_than_what_is_found(cut, usual
             near += pair.score > score - 3.0
             passed_over += pair.score > score - 3.0 and pair.noise.kinds not in told
     assert near > 100
+    # Odds of 20, and one pair in ten: what is passed over moves no probability from open to certain.
     assert min(behind) > -3.0
     assert passed_over < 0.1 * near
 

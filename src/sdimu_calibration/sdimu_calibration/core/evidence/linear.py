@@ -20,7 +20,6 @@ from sdimu_calibration.core.effects.imu_model import prior_size
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.conditions import Conditions
-from sdimu_calibration.core.evidence.grown import NOT_GROWN, Grown, chosen
 from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.inner_noise import InnerNoise
@@ -68,8 +67,6 @@ class LinearEvidence(ABC):
     """How many of the model's parameters, the first ones, are sensor coefficients."""
     noise: InStops | None = field(default=None, kw_only=True)
     """Signatures of the modes of noise with a memory, N rows and r columns; None without any."""
-    grown: Grown = field(default=NOT_GROWN, kw_only=True, repr=False, compare=False)
-    """Memory of W, with room for more columns."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
     """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
@@ -77,9 +74,7 @@ class LinearEvidence(ABC):
     """
 
     def __post_init__(self, worked_out: Information | None) -> None:
-        """Keep the information that is known, and no memory of other columns."""
-        if self.grown.memory is not None and not self.grown.holds(self.W):
-            object.__setattr__(self, "grown", NOT_GROWN)
+        """Keep the information that is known."""
         if worked_out is not None:
             object.__setattr__(self, "information", worked_out)
 
@@ -209,8 +204,7 @@ class LinearEvidence(ABC):
         more, prior = candidate_priors(effects, self.imu)
         W = self.signature(effects) if signature is None else signature
         # Only what is new is multiplied: the old columns are many.
-        weighed, grown, old = self.weighed(W), self.grown.beside(self.W, W), self.information
-        every = grown.columns
+        weighed, every, old = self.weighed(W), np.hstack([self.W, W]), self.information
         q = len(old.d)
         J = np.empty((every.shape[1], every.shape[1]))
         J[:q, :q] = old.J
@@ -224,7 +218,6 @@ class LinearEvidence(ABC):
         return replace(
             self,
             W=every,
-            grown=grown,
             names=(*self.names, *(c.label for c in more)),
             candidates=(*self.candidates, *more),
             prior=np.concatenate([self.prior, prior]),
@@ -249,7 +242,7 @@ class LinearEvidence(ABC):
         full = self.information
         return replace(
             self,
-            W=self.W[:, : len(keep)] if whole else chosen(self.W, keep),
+            W=self.W[:, : len(keep)] if whole else _chosen(self.W, keep),
             names=tuple(self.names[i] for i in keep),
             candidates=tuple(self.candidate(i) for i in columns),
             prior=self.prior[columns - p],
@@ -315,7 +308,7 @@ class LinearEvidence(ABC):
         return replace(
             self,
             e=self.e - self.W[:, columns] @ self.shift[columns],
-            W=chosen(self.W, order),
+            W=_chosen(self.W, order),
             names=(*(self.names[i] for i in stays), *(c.label for c in tried), *self.names[p:]),
             weight=self.weight[stays],
             shift=self.shift[stays],
@@ -338,3 +331,8 @@ def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[
     candidates = tuple(c for effect in effects for c in split(effect))
     sizes = [prior_size(c.effect, imu) for c in candidates]
     return candidates, np.array([np.inf if size is None else size for size in sizes])
+
+
+def _chosen(W: Floats, columns: Ints) -> Floats:
+    """Copy some columns of a matrix, each in one piece of memory, as W has them."""
+    return np.take(W.T, columns, axis=0).T
