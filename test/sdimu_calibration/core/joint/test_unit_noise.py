@@ -12,7 +12,6 @@ from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, 
 from sdimu_calibration.storage.files.config import load_imu
 
 USUAL = usual_sizes(load_imu("mems_industrial"))
-ODDS = log_odds(8)
 
 
 def having(size, width, kind="flicker", tau=0.0):
@@ -22,7 +21,7 @@ def having(size, width, kind="flicker", tau=0.0):
     mode = of_posterior**2 * (np.log(size) / width**2 + centre / spread**2)
     term = NoiseTerm("gyro", kind, tau=tau, size=float(np.exp(mode)))
     mass = float(USUAL.log_density(term, np.array([term.size]))[0]) + np.log(of_posterior * np.sqrt(2.0 * np.pi))
-    return NoiseModel((term,), (ODDS[kind] + mass,))
+    return NoiseModel((term,), (log_odds(term) + mass,))
 
 
 def of_unit_by_quadrature(sizes, widths, alike=0.2):
@@ -35,7 +34,9 @@ def of_unit_by_quadrature(sizes, widths, alike=0.2):
         each = widths / np.sqrt(u2) * np.exp(0.5 * (mode - at) ** 2 / widths**2 - 0.5 * (s - at) ** 2 / u2)
         return np.exp(-0.5 * ((s - centre) / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi)) * np.prod(each)
 
-    return ODDS["flicker"] + np.log(quad(density, centre - 12.0, centre + 12.0, points=at, limit=400)[0])
+    return log_odds(NoiseTerm("gyro", "flicker")) + np.log(
+        quad(density, centre - 12.0, centre + 12.0, points=at, limit=400)[0]
+    )
 
 
 def test_noise_of_the_unit_has_the_prior_of_one_size():
@@ -44,7 +45,7 @@ def test_noise_of_the_unit_has_the_prior_of_one_size():
     own = [having(*one) for one in zip(sizes, widths, strict=True)]
     apart = np.log(0.5) + sum(noise.log_prior for noise in own)
     expected = np.logaddexp(apart, np.log(0.5) + of_unit_by_quadrature(sizes, widths))
-    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(expected, abs=1e-6)
+    assert log_prior_of_set(own, USUAL) == pytest.approx(expected, abs=1e-6)
     # One size for three costs less than three sizes.
     assert expected > apart + 2.0
 
@@ -56,37 +57,37 @@ def test_the_prior_of_a_size_counts_once_whatever_the_number_of_recordings(off):
     own = [having(*one) for one in zip(sizes, widths, strict=True)]
     apart = np.log(0.5) + sum(noise.log_prior for noise in own)
     expected = np.logaddexp(apart, np.log(0.5) + of_unit_by_quadrature(sizes, widths))
-    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(expected, abs=1e-6)
+    assert log_prior_of_set(own, USUAL) == pytest.approx(expected, abs=1e-6)
 
 
 def test_gauss_markov_noise_of_the_unit_has_one_time_constant():
     usual = USUAL.centre["gyro", "markov"]
-    apart = np.log(0.5) + 2.0 * having(usual, 0.3, "markov", 6.0).log_prior
-    near = [having(usual, 0.3, "markov", tau) for tau in (6.0, 12.0)]
-    far = [having(usual, 0.3, "markov", tau) for tau in (6.0, 1200.0)]
-    assert log_prior_of_set(near, USUAL, ODDS) > apart + 1.0
-    assert log_prior_of_set(far, USUAL, ODDS) == pytest.approx(apart)
+    near = [having(usual, 0.3, "markov", tau) for tau in (150.0, 300.0)]
+    far = [having(usual, 0.3, "markov", tau) for tau in (30.0, 300.0)]
+    apart = [np.log(0.5) + sum(noise.log_prior for noise in own) for own in (near, far)]
+    assert log_prior_of_set(near, USUAL) > apart[0] + 1.0
+    assert log_prior_of_set(far, USUAL) == pytest.approx(apart[1])
 
 
 def test_noise_of_very_different_sizes_is_that_of_each_recording():
     usual = USUAL.centre["gyro", "flicker"]
     own = [having(usual, 0.05), having(20.0 * usual, 0.05)]
     apart = np.log(0.5) + sum(noise.log_prior for noise in own)
-    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(apart, abs=1e-6)
+    assert log_prior_of_set(own, USUAL) == pytest.approx(apart, abs=1e-6)
 
 
 def test_noise_that_one_recording_lacks_is_not_of_the_unit():
     usual = USUAL.centre["gyro", "flicker"]
     own = [having(usual, 0.2), having(usual, 0.2), NoiseModel()]
     apart = np.log(0.5) + sum(noise.log_prior for noise in own)
-    assert log_prior_of_set(own, USUAL, ODDS) == pytest.approx(apart, abs=1e-12)
+    assert log_prior_of_set(own, USUAL) == pytest.approx(apart, abs=1e-12)
 
 
 def test_white_noise_in_all_recordings_costs_nothing():
-    assert log_prior_of_set([NoiseModel()] * 4, USUAL, ODDS) == 0.0
+    assert log_prior_of_set([NoiseModel()] * 4, USUAL) == 0.0
 
 
 @pytest.mark.parametrize("kind", ["attitude", "stop", "shift"])
 def test_what_a_missing_effect_looks_like_is_weighed_by_each_recording(kind):
     one = NoiseModel((NoiseTerm("accel", kind, size=1e-3),), (-4.0,))
-    assert log_prior_of_set([one, one], USUAL, ODDS) == pytest.approx(-8.0)
+    assert log_prior_of_set([one, one], USUAL) == pytest.approx(-8.0)

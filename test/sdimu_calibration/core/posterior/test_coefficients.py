@@ -9,9 +9,10 @@ import pytest
 from bare_prior import prior
 
 from sdimu_calibration.core.posterior import coefficients
-from sdimu_calibration.core.posterior.coefficients import Averages, _Beside
+from sdimu_calibration.core.posterior.coefficients import Averages, _Beside, averaged
 from sdimu_calibration.core.posterior.models import Data
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.posterior import Weighed
 from sdimu_calibration.core.posterior.search import WINDOW
 
 
@@ -22,9 +23,7 @@ def test_moments_over_all_models_are_those_of_the_mixture(bench, monkeypatch):
     diagnosis = bench.diagnosis(12, hidden, "recommended")
     found = diagnosis.found.posterior
     averages = Averages(found.board, diagnosis.fit.dwell_means)
-    told, models = averages.of(found), found.models[:400]
-    weight = np.array([m.probability for m in models])
-    weight /= weight.sum()
+    told, (models, weight) = averages.of(found), averaged(found.models)
     each = [averages.of_model(m.members, m.noise) for m in models]
     mean = sum(w * one.mean for w, one in zip(weight, each, strict=True))
     second = sum(w * (one.covariance + np.outer(one.mean, one.mean)) for w, one in zip(weight, each, strict=True))
@@ -37,6 +36,35 @@ def test_moments_over_all_models_are_those_of_the_mixture(bench, monkeypatch):
     # Which drift it is stays open, so that models differ.
     assert (np.diag(told.covariance) / np.where(within > 0.0, within, 1.0)).max() > 1.1
     assert weight.max() < 0.95
+
+
+def test_chosen_models_stand_for_a_window_of_more():
+    """Twelve effects are open, three improbable: the likeliest models have hardly any of these."""
+    p = np.concatenate([np.full(12, 0.4), [0.05, 0.05, 0.05]])
+    models = []
+    for number in range(1 << len(p)):
+        there = np.array([number >> k & 1 for k in range(len(p))], dtype=bool)
+        members = tuple((k, 0) for k in np.flatnonzero(there).tolist())
+        models.append(Weighed(members, NoiseModel(), float(np.prod(np.where(there, p, 1.0 - p)))))
+    models.sort(key=lambda one: -one.probability)
+    chosen, weight = averaged(models)
+    assert len(chosen) <= 600
+    assert len(set(chosen)) == len(chosen)
+    assert weight.sum() == pytest.approx(1.0)
+    assert chosen[:200] == models[:200]
+    np.testing.assert_allclose(weight[:200], [one.probability for one in models[:200]], rtol=1e-9)
+
+    def shares(some, weights):
+        return np.array([sum(w for m, w in zip(some, weights, strict=True) if (k, 0) in m.members) for k in range(15)])
+
+    # Three sigma of a sample of four hundred that is drawn at random.
+    assert np.all(np.abs(shares(chosen, weight) - p) < 3.0 * np.sqrt(p * (1.0 - p) / 400.0))
+    likeliest = models[:600]
+    of_those = np.array([m.probability for m in likeliest])
+    assert shares(likeliest, of_those / of_those.sum())[12:].max() < 0.01
+    fewer, alone = averaged(models[:500])
+    assert fewer == models[:500]
+    assert alone.sum() == pytest.approx(1.0)
 
 
 def test_half_of_an_equation_that_no_physics_names_moves_no_coefficient(bench):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
+from sdimu_calibration.core.posterior.combinations import combinations_of, crossed, exchanged
+from sdimu_calibration.core.posterior.search import best_from
 
 from .test_models import data_of, drawn, prior
 
@@ -31,6 +34,31 @@ def test_a_model_is_crossed_to_the_pair_with_its_best_widths(data):
     other = tuple((number, 2) for number, _ in pair)
     assert data.at(pair).score >= data.at(other).score
     assert crossed(data, ((0, 0), (2, 0), (5, 0))) == []
+
+
+def test_two_effects_that_together_are_two_others_are_exchanged_for_them():
+    """Delays of x and y alike are a delay of the triad beside the opposite one of z: no other pair comes near."""
+    rng = np.random.default_rng(5)
+    W = drawn(6, rng, alike=0.0)
+    W[:, 3] = W[:, 0] + W[:, 1] + W[:, 2]
+    e = 3.0 * (W[:, 0] + W[:, 1]) + rng.standard_normal(len(W))
+    data = data_of(W, e, prior(6))
+    for here, there in (((0, 1), (2, 3)), ((2, 3), (0, 1))):
+        members = tuple((number, 1) for number in here)
+        (found,) = exchanged(data, members, data.at(members).score - 7.0)
+        assert tuple(number for number, _ in found) == there
+        # No climb of one move at a time comes from one to the other.
+        assert best_from(data, members, of_two=False)[1] == members
+    assert exchanged(data, members, data.at(found).score + 1e-6) == []
+
+
+def test_what_comes_in_the_place_of_two_is_no_variant_of_them():
+    rng = np.random.default_rng(6)
+    W = drawn(5, rng, alike=0.0)
+    W[:, 2:4] = W[:, 0:2] + 1e-3 * rng.standard_normal((len(W), 2))
+    known = replace(prior(5), parameter=np.array([0, 1, 0, 1, 2]))
+    data = data_of(W, 3.0 * (W[:, 0] + W[:, 1]) + rng.standard_normal(len(W)), known)
+    assert exchanged(data, ((0, 1), (1, 1)), data.at(()).score + 1.0) == []
 
 
 def test_by_unit_force_a_cross_term_is_a_quadratic_term_with_the_other_cross_term(bench):

@@ -7,6 +7,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from sdimu_calibration.core.effects.effect import Timetable
 from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation
@@ -148,12 +149,24 @@ def test_kinds_in_the_place_of_strong_noise_are_sized_beside_the_noise_that_is_t
             size, gain = InModes.of(given, cut, term.kind, term.tau).sizes_on_grid(term.axes)
             share = np.exp(gain + usual.log_density(term, size) - gain.max())
             log_mass = np.log(share.sum() * np.log(size[1] / size[0]))
-            markov = sum(t.kind == MARKOV for t in every_kind(cut)) // 2
-            score[term.identity] = gain.max() + log_mass + log_odds(markov)[term.kind]
+            score[term.identity] = gain.max() + log_mass + log_odds(term)
         near = {kind for kind, one in score.items() if one > max(score.values()) - 4.0}
         open_ += len(near) - 1
         assert near <= told
     assert open_ > 0
+
+
+def test_the_time_constants_of_gauss_markov_noise_share_its_odds(cut):
+    markov = [t for t in every_kind(cut) if t.triad == "gyro" and t.kind == MARKOV]
+    share = np.array([np.exp(log_odds(term)) for term in markov]) / ODDS[MARKOV]
+    # Of a log-normal prior what lies between the tried ones; the rest is faster than a stretch or slower than the test.
+    tau = np.array([term.tau for term in markov])
+    density = norm(np.log(300.0), 1.2)
+    within = density.cdf(np.log(tau[-1] * 2**0.5)) - density.cdf(np.log(tau[0] * 2**-0.5))
+    assert share.sum() == pytest.approx(within, abs=0.02)
+    assert abs(np.log(tau[np.argmax(share)] / 300.0)) < np.log(1.5)
+    assert np.diff(np.log(tau)) == pytest.approx(np.log(2.0), rel=0.01)
+    assert tau[-1] == pytest.approx(cut.end[-1] / 3.0, rel=0.01)
 
 
 def two_in_each(rng, cut, usual):

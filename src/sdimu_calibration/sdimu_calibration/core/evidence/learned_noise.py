@@ -59,8 +59,8 @@ _INTERVAL = 1.92
 """Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
 _SHORTEST_TAU = 0.2
 """Ratio of the shortest time constant that is tried to a stretch: faster noise is white from stretch to stretch."""
-TIMES = 8
-"""Number of time constants that are tried, up to a third of the test: neighbours differ by less than an interval."""
+TAU_RATIO = 2.0
+"""Ratio (1) of neighbouring time constants that are tried, up to a third of the test: less than their interval."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,8 @@ def kinds(cut: Stretches) -> list[NoiseTerm]:
     """List the terms that are tried: every kind in each triad, Markov noise with several time constants."""
     shortest = _SHORTEST_TAU * float(np.median(cut.end - cut.start))
     longest = max(float(cut.end[-1]) / 3.0, 2.0 * shortest)
-    taus = [float(f"{tau:.3g}") for tau in np.geomspace(shortest, longest, TIMES)]
+    count = 1 + int(np.log(longest / shortest) / np.log(TAU_RATIO) + 1e-9)
+    taus = [float(f"{longest * TAU_RATIO**-k:.3g}") for k in reversed(range(count))]
     out = []
     for triad in TRIADS:
         out += [NoiseTerm(triad, kind) for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT)]

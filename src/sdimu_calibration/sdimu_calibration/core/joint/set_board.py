@@ -12,7 +12,6 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import TIMES
 from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
@@ -22,7 +21,7 @@ from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
 from sdimu_calibration.core.posterior.models import Members, gains
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, log_odds, usual_sizes
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, usual_sizes
 from sdimu_calibration.core.posterior.prior import Prior, prior_of, twins
 
 _NEAR = 6.0
@@ -109,7 +108,7 @@ class SetBoard(Board[SetEvidence]):
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self._white = (0,) * len(self.rivals)
         self._found: dict[Members, dict[tuple[int, ...], float]] = {}
-        self._usual = usual_sizes(evidence.imu), log_odds(TIMES)
+        self._usual = usual_sizes(evidence.imu)
         self._told = len(evidence.weight) + np.arange(len(told))
         self.known = self._names[: len(evidence.weight) + len(told)]
 
@@ -269,7 +268,7 @@ class SetBoard(Board[SetEvidence]):
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
         own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=True))
         terms = tuple(t for noise in own for t in noise.terms)
-        return SetNoise(terms, (), chosen, own, log_prior_of_set(own, *self._usual))
+        return SetNoise(terms, (), chosen, own, log_prior_of_set(own, self._usual))
 
     def _chosen(self, noise: NoiseModel) -> tuple[int, ...]:
         return noise.chosen if isinstance(noise, SetNoise) else self._white

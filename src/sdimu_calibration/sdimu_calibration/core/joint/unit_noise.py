@@ -11,13 +11,13 @@ the posterior, which the share of the sizes says (`NoiseModel.shares`), without 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes
+from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes, log_odds
 
 _OF_UNIT = 0.5
 """Probability (1) that noise of a kind is of the unit: sensors are the same in all recordings, benches are not."""
@@ -37,15 +37,13 @@ def kind_of(term: NoiseTerm) -> Kind:
     return term.triad, term.kind, term.axes
 
 
-def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes, odds: Mapping[str, float]) -> float:
+def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes) -> float:
     """Log prior (1) of the noises of all recordings, over white noise in all.
 
     Parameters
     ----------
     own : sequence of NoiseModel
         Of each recording.
-    odds : mapping of str to float
-        Log odds of each kind beside none (1), as of `log_odds`.
     """
     terms: dict[Kind, list[tuple[NoiseTerm, float]]] = {}
     total = 0.0
@@ -56,10 +54,10 @@ def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes, odds: Mapping[str,
                 total += share
             else:
                 terms.setdefault(kind_of(term), []).append((term, share))
-    for (_, kind, _), found in terms.items():
+    for found in terms.values():
         apart = np.log(1.0 - _OF_UNIT) + sum(share for _, share in found)
         everywhere = len(found) == len(own) and _one_time([term.tau for term, _ in found])
-        alike = np.log(_OF_UNIT) + _of_unit(found, usual, odds[kind]) if everywhere else -np.inf
+        alike = np.log(_OF_UNIT) + _of_unit(found, usual) if everywhere else -np.inf
         total += float(np.logaddexp(apart, alike))
     return total
 
@@ -69,12 +67,16 @@ def _one_time(tau: Sequence[float]) -> bool:
     return max(tau) <= _ONE_TIME * min(tau)
 
 
-def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float) -> float:
-    """Log prior (1) of a kind of noise that is of the unit, by the term and its share in each recording."""
+def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes) -> float:
+    """Log prior (1) of a kind of noise that is of the unit, by the term and its share in each recording.
+
+    Where recordings have different time constants that may be one, its odds are those in the middle.
+    """
     first = found[0][0]
     centre, spread = np.log(usual.centre[first.triad, first.kind]), usual.spread[first.triad, first.kind]
     size: Floats = np.array([term.size for term, _ in found])
     share = np.array([share for _, share in found])
+    odds = np.array([log_odds(term) for term, _ in found])
     mode = np.log(size) - centre
     of_posterior = np.exp(2.0 * (share - odds - usual.log_density(first, size))) / (2.0 * np.pi)
     # Of the likelihood: a posterior as wide as the prior says that the data know nothing.
@@ -85,7 +87,7 @@ def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes, odds: float
     pull = float(np.sum(at / wider2))
     squares = float(np.sum(at**2 / wider2))
     return float(
-        odds
+        odds.mean()
         + 0.5 * (pull**2 / known - squares)
         - 0.5 * np.log(spread**2 * known)
         # The share is that of the size at the mode of the posterior, not of the likelihood.

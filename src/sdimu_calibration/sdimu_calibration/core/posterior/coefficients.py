@@ -35,8 +35,10 @@ from sdimu_calibration.core.posterior.prior import WIDTHS
 from sdimu_calibration.core.posterior.search import WINDOW
 from sdimu_calibration.core.recording import DataError
 
-_MOST = 400
-"""Number of models that are averaged at most, the likeliest first: those behind weigh less than a thousandth each."""
+_MOST = 600
+"""Number of models (1) that are averaged at most: four hundred behind the likeliest give probabilities to .025."""
+_LIKELIEST = 200
+"""Number of models (1) that are averaged with their own weights: the others of `_MOST` stand for all that follow."""
 _BESIDE = 40
 """Number of models (1) beside which the probability of what no averaged model holds is taken: the likeliest, which are
 nearly alike in what they lack."""
@@ -200,9 +202,7 @@ class Averages:
 
     def of(self, found: Posterior[E]) -> Moments:
         """Moments over all models."""
-        models = found.models[:_MOST]
-        weight = np.array([m.probability for m in models])
-        weight = weight / weight.sum()
+        models, weight = averaged(found.models)
         each = [self.of_model(m.members, m.noise, as_told=False) for m in models]
         means = np.array([one.mean for one in each])
         mean = weight @ means
@@ -278,6 +278,41 @@ class Averages:
                 H = divided(one.modes.L, G)
                 self._noises[noise] = _Mean(H.T @ one.modes.Z, H.T @ one.modes.z, H.T @ H)
         return self._noises[noise]
+
+
+def averaged(models: Sequence[Weighed]) -> tuple[list[Weighed], Floats]:
+    """Choose models that stand for all of a window, each with its weight.
+
+    With many effects open a window holds ten thousand models. What is in one of fifty of them is in none of the
+    likeliest: a step that may have come at another time left a bias seven sigma off. Of the models behind the likeliest
+    every one has the chance of its probability to be taken, so that each effect keeps its probability but for the
+    scatter of a sample: W. Madow, "On the theory of systematic sampling", Annals of Mathematical Statistics 20 (1949).
+
+    Parameters
+    ----------
+    models : sequence of Weighed
+        The likeliest first.
+
+    Returns
+    -------
+    models : list of Weighed, length k
+        `_MOST` at most, the likeliest first.
+    weight : ndarray, shape (k,)
+        Of each (1), one in all.
+    """
+    weight = np.array([m.probability for m in models])
+    chosen = np.arange(len(models))
+    if len(models) > _MOST:
+        # Models alike stand side by side, so that each set of effects has its share.
+        behind = sorted(range(_LIKELIEST, len(models)), key=lambda k: ([n for n, _ in models[k].members], k))
+        passed = np.cumsum(weight[behind])
+        step = passed[-1] / (_MOST - _LIKELIEST)
+        at = np.searchsorted(passed, step * (0.5 + np.arange(_MOST - _LIKELIEST)))
+        taken, times = np.unique(np.minimum(at, len(behind) - 1), return_counts=True)
+        order = np.argsort(taken_at := np.array(behind)[taken])
+        chosen = np.concatenate([np.arange(_LIKELIEST), taken_at[order]])
+        weight = np.concatenate([weight[:_LIKELIEST], step * times[order]])
+    return [models[k] for k in chosen.tolist()], weight / weight.sum()
 
 
 def _inverse_times(at: Sequence[int], covariance: Floats, estimate: Floats) -> Floats:

@@ -1,10 +1,13 @@
-"""Two effects that together are a third one.
+"""Two effects that together are a third one, and two that together are two others.
 
-By ``|a| = 1`` at rest a quadratic term and a cross term are another cross term beside a bias. A search that exchanges
-one at a time does not cross from one side to the other.
+By ``|a| = 1`` at rest a quadratic term and a cross term are another cross term beside a bias. Delays of two of three
+accelerometers that are nearly alike are a delay of the triad beside the opposite one of the third. A search that
+exchanges one at a time does not cross from one side to the other.
 """
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 
@@ -62,4 +65,23 @@ def crossed(data: Data, members: Members) -> list[Members]:
             score, best = max((data.at(one).score, one) for one in trials)
             if np.isfinite(score):
                 out.append(best)
+    return out
+
+
+def exchanged(data: Data, members: Members, least: float) -> list[Members]:
+    """Give the models that have the best two others in the place of two members.
+
+    Parameters
+    ----------
+    members : tuple of (int, int)
+        A model.
+    least : float
+        Log posterior, over that of the empty set in the same noise, that they exceed (1).
+    """
+    out: list[Members] = []
+    for two in combinations(members, 2):
+        others = tuple(member for member in members if member not in two)
+        score, found = data.at(others).paired([number for number, _ in two])
+        if score > least:
+            out.append(found)
     return out

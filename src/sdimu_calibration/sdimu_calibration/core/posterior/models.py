@@ -12,7 +12,7 @@ one.
 from __future__ import annotations
 
 from bisect import bisect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -213,14 +213,20 @@ class Expansion:
         columns = [column for column, _ in members]
         return float(sum(_LOG_SHARE[width] for _, width in members)) + self.data.prior.log_of(columns)
 
-    def paired(self) -> tuple[float, Members]:
-        """Add the best two candidates at once: log posterior of the model, and the model."""
+    def paired(self, instead: Sequence[int] = ()) -> tuple[float, Members]:
+        """Add the best two candidates at once: log posterior of the model, and the model.
+
+        Parameters
+        ----------
+        instead : sequence of int
+            Candidates in whose place the two stand: neither is a variant of one of them, nor its twin.
+        """
         J, prior = self.data.J, self.data.prior
         more = prior.log_more(self.columns)
         # Odds of the second beside the first: k + 2 over k + 1, and its kin.
         step = np.log((prior.named(self.columns) + 2.0) / (prior.named(self.columns) + 1.0))
         # Two equations that no physics names are too many.
-        use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0) & ~prior.own)
+        use = np.flatnonzero(np.isfinite(more) & (self.c > 0.0) & ~prior.own & ~prior.like(instead))
         if len(use) < 2:
             return -np.inf, self.members
         X = J[np.ix_(use, use)] - self._V[use] @ J[self.columns][:, use]

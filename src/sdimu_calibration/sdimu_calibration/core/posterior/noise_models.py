@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.evidence.learned_noise import kinds
+from sdimu_calibration.core.evidence.learned_noise import TAU_RATIO, kinds
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import (
     AXES,
@@ -47,6 +47,10 @@ STATED_SPREAD = 1.0
 """Standard deviation of the log of a size about that of a data sheet (1): a factor of 2.7."""
 USUAL_SPREAD = 2.3
 """Standard deviation of the log of a size where no data sheet states one (1): a factor of ten."""
+MARKOV_S = 300.0
+"""Usual time constant of Gauss-Markov noise (s): minutes, in sensors of all grades."""
+MARKOV_SPREAD = 1.2
+"""Standard deviation of the log of that time constant about the usual one (1): a factor of three."""
 INSTABILITY: Mapping[str, Mapping[str, float]] = {
     "gyro": {grade: to_si(size, "deg/h") for grade, size in (("navigation", 0.01), ("tactical", 1.0), ("mems", 20.0))},
     "accel": {grade: to_si(size, "ug") for grade, size in (("navigation", 2.0), ("tactical", 30.0), ("mems", 100.0))},
@@ -155,16 +159,17 @@ def usual_sizes(imu: ImuSpecification) -> Sizes:
     return Sizes(centre, spread)
 
 
-def log_odds(times: int) -> dict[str, float]:
-    """Log odds (1) of one term of each kind beside none.
+def log_odds(term: NoiseTerm) -> float:
+    """Log odds (1) of a term beside none.
 
-    Parameters
-    ----------
-    times : int
-        Number of time constants of Gauss-Markov noise that are tried.
+    The odds of a kind are shared by the sensors that it may be of, and by its time constants: each that is tried stands
+    for all that lie nearer to it than to its neighbours.
     """
-    variants = {MARKOV: times, **dict.fromkeys(FOLLOWS, len(SENSORS))}
-    return {kind: float(np.log(odds / variants.get(kind, 1))) for kind, odds in ODDS.items()}
+    odds = float(np.log(ODDS[term.kind]))
+    if term.kind == MARKOV:
+        off = np.log(term.tau / MARKOV_S) / MARKOV_SPREAD
+        odds += float(np.log(np.log(TAU_RATIO) / (MARKOV_SPREAD * np.sqrt(2.0 * np.pi))) - 0.5 * off**2)
+    return odds - float(np.log(len(SENSORS) if term.kind in FOLLOWS else 1))
 
 
 def every_kind(cut: Stretches) -> list[NoiseTerm]:

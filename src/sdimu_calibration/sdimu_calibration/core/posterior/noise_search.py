@@ -14,7 +14,7 @@ import numpy as np
 
 from sdimu_calibration.core.evidence.learned_noise import InModes, InTriad, NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
-from sdimu_calibration.core.noise_term import DRAWN, MARKOV, TRIADS, Identity, NoiseTerm
+from sdimu_calibration.core.noise_term import DRAWN, TRIADS, Identity, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes, every_kind, log_odds
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -64,9 +64,7 @@ class _Search:
         self, information: NoiseInformation, cut: Stretches, usual: Sizes, tried: Sequence[NoiseTerm] | None
     ) -> None:
         self.information, self.cut, self.usual = information, cut, usual
-        every = every_kind(cut)
-        self.tried = every if tried is None else list(tried)
-        self.log_odds = log_odds(sum(t.kind == MARKOV for t in every) // len(TRIADS))
+        self.tried = every_kind(cut) if tried is None else list(tried)
         self.seen: dict[frozenset[Identity], _Found] = {}
 
     def keep(self, found: _Found) -> _Found:
@@ -120,7 +118,7 @@ class _Search:
         step = np.gradient(np.log(size))
         log_mass = float(log_posterior[best] + np.log(np.sum(np.exp(log_posterior - log_posterior[best]) * step)))
         found = replace(term, size=float(size[best]), gain=float(gain[best]))
-        return found, self.log_odds[term.kind] + log_mass - float(gain[best])
+        return found, log_odds(term) + log_mass - float(gain[best])
 
     def without(self, best: _Found, place: int) -> _Found:
         """Leave one term out for another one in its place: the others keep the sizes that they have beside it.

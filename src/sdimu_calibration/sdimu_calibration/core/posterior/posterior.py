@@ -18,7 +18,7 @@ from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import KINDS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.climb import climbed, in_same_noise
-from sdimu_calibration.core.posterior.combinations import combinations_of, crossed
+from sdimu_calibration.core.posterior.combinations import combinations_of, crossed, exchanged
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.models import Members
 from sdimu_calibration.core.posterior.noise_models import NoiseModel, every_kind
@@ -333,7 +333,9 @@ def posterior(
         members = ends[0]
     board = board.in_excess(board.excess_of(members, noises[0]))
     data = [board.data(noise) for noise in noises]
-    starts = [*ends, *crossed(data[0][1], members)]
+    best = data[0][1]
+    others = exchanged(best, members, best.at(members).score - WINDOW)
+    starts = [*ends, *crossed(best, members), *others]
     found = window([d for _, d in data], [offset for offset, _ in data], starts)
     models = _weighed(found, noises)
     return Posterior(board, models, _noises(models, _in_excess(beside, board.excess)))

@@ -119,6 +119,16 @@ class Prior:
             self._known_odds[named] = odds
         return self._known_odds[named]
 
+    def like(self, some: Sequence[int]) -> Bools:
+        """Say which candidates are variants or twins of some, or these themselves.
+
+        Returns
+        -------
+        ndarray of bool, shape (q,)
+        """
+        at = np.asarray(some, dtype=np.int64)
+        return np.isin(self.parameter, self.parameter[at]) | np.isin(self.twin, self.twin[at])
+
     def named(self, base: Sequence[int]) -> int:
         """Count the candidates of a model that are no equations."""
         return int(np.count_nonzero(~self.own[np.asarray(base, dtype=np.int64)]))
