@@ -253,6 +253,44 @@ def test_of_drawn_kinds_in_the_place_of_others_each_choice_is_tried_once_and_wha
     assert second.terms == (replace(stop.terms[0], size=1.0), walk)
 
 
+def test_another_kind_is_tried_in_the_place_of_each_that_wanders():
+    walk, flicker, markov = (NoiseTerm("gyro", kind, size=2.0) for kind in (RANDOM_WALK, FLICKER, MARKOV))
+    accel = NoiseTerm("accel", FLICKER, size=3.0)
+
+    def noise(*terms):
+        return NoiseModel(terms, (-1.0,) * len(terms))
+
+    likeliest = noise(walk, flicker)
+    others = [likeliest, noise(walk, markov), noise(walk), noise(accel), noise(markov), noise(markov, accel)]
+    assert instead_of(likeliest, others) == [noise(flicker), noise(walk), noise(markov), noise(walk, markov)]
+
+
+def ramps(rng, cut, usual):
+    """Gauss-Markov noise, and a ramp of one sensor by twelve times as much in the whole test."""
+    n, size = len(cut), usual.centre["gyro", MARKOV]
+    J = (2.0 / size) ** 2
+    root = np.linalg.cholesky(kernel(MARKOV, 30.0, cut) + 1e-12 * np.eye(n))
+    error = np.zeros((n, 6))
+    error[:, :3] = size * root @ rng.standard_normal((n, 3))
+    error[:, 0] += np.linspace(-6.0, 6.0, n) * size
+    d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n)
+    return NoiseInformation(J * np.eye(6 * n), d, 0.0)
+
+
+def test_noise_without_the_kind_that_stands_for_a_ramp_is_found_far_behind(cut, usual):
+    """A random walk makes the ramp; beside the ramp Gauss-Markov noise is the likeliest by itself."""
+    tried = [NoiseTerm("gyro", RANDOM_WALK), NoiseTerm("gyro", MARKOV, 30.0)]
+    behind = []
+    for seed in range(6):
+        information = ramps(np.random.default_rng(seed), cut, usual)
+        (first, likeliest), *others = explored(information, cut, usual, tried)
+        assert RANDOM_WALK in {t.kind for t in likeliest.terms}
+        own = [(score, {t.kind for t in noise.terms if t.triad == "gyro"}) for score, noise in others]
+        behind += [first - score for score, kinds in own if kinds and RANDOM_WALK not in kinds]
+    assert min(behind) > 6.0
+    assert len(behind) >= 4
+
+
 def shifted_once(rng, cut, size):
     """Bias drawn anew at each stop, and shifted by three times as much half way."""
     n, J = len(cut), 1.0 / size**2

@@ -217,13 +217,33 @@ def _first(found: Sequence[_Found], least: float) -> list[_Found]:
     return list(out.values())[:_MOST_PAIRED]
 
 
-def _otherwise_drawn(ranked: Sequence[_Found]) -> list[_Found]:
-    """Noises with other drawn terms in the place of the likeliest's: with an effect beside it one may be likelier."""
+def _otherwise(ranked: Sequence[_Found]) -> list[_Found]:
+    """Noises with other terms in the place of one of the likeliest's: with an effect beside it one may be likelier."""
     far = [found for found in ranked if ranked[0].score - _BEHIND < found.score <= ranked[0].score - _NEAR]
     behind = {found.noise: found for found in far}
     near = [found.noise for found in ranked if found.score > ranked[0].score - _NEAR]
-    out = [noise for triad in TRIADS for noise in _first_of_each(ranked[0].noise, [*near, *behind], triad)]
+    likeliest, others = ranked[0].noise, [*near, *behind]
+    out = [noise for triad in TRIADS for noise in _first_of_each(likeliest, others, triad)]
+    out += _first_without_each(likeliest, others)
     return [behind[noise] for noise in dict.fromkeys(out) if noise in behind]
+
+
+def _first_without_each(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
+    """First noise that has another kind in the place of each term that wanders by itself.
+
+    A random walk stands for a ramp beside Gauss-Markov noise, which is likelier with the ramp alone.
+    """
+    out = dict[NoiseModel, None]()
+    for term in likeliest.terms:
+        apart = (
+            noise
+            for noise in others
+            if (own := _of_triad(noise, term.triad)) and all(one.kind != term.kind for one in own)
+        )
+        first = next(apart, None)
+        if term.kind not in DRAWN and first is not None:
+            out[first] = None
+    return list(out)
 
 
 def _first_of_each(likeliest: NoiseModel, others: Sequence[NoiseModel], triad: str) -> list[NoiseModel]:
@@ -237,8 +257,9 @@ def _first_of_each(likeliest: NoiseModel, others: Sequence[NoiseModel], triad: s
 def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
     """List noises in which an effect is seen that a term of the likeliest noise stands for.
 
-    Each term may be one: the others have their sizes then. Where other drawn terms come in its place, their size beside
-    no effect has taken up the effect: they are made smaller.
+    Each term may be one: the others have their sizes then, or there is another kind in the place of one that wanders.
+    Where other drawn terms come in its place, their size beside no effect has taken up the effect: they are made
+    smaller.
 
     Parameters
     ----------
@@ -250,6 +271,7 @@ def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[Nois
     list of NoiseModel
     """
     out = [_without(likeliest, place) for place in range(len(likeliest.terms))]
+    out += _first_without_each(likeliest, others)
     for triad in TRIADS:
         out += [_smaller(noise, triad) for noise in _first_of_each(likeliest, others, triad)]
     return out
@@ -306,8 +328,8 @@ def explored(
     Returns
     -------
     list of (float, NoiseModel)
-        Log posterior of each over white noise (1), the likeliest first. Then those that have other drawn terms in the
-        place of its drawn ones. The last one is far behind where all others have terms that stand in the place of
+        Log posterior of each over white noise (1), the likeliest first. Then those that have other terms in the place
+        of one of its own. The last one is far behind where all others have terms that stand in the place of
         effects: it is the likeliest without them.
     """
     search = _Search(information, cut, usual, tried)
@@ -336,7 +358,7 @@ def explored(
     search.crossed(search.best())
     ranked = sorted(search.seen.values(), key=lambda found: -found.score)
     near = [(found.score, found.noise) for found in ranked if found.score > ranked[0].score - _NEAR][:_MOST]
-    near += [(found.score, found.noise) for found in _otherwise_drawn(ranked)]
+    near += [(found.score, found.noise) for found in _otherwise(ranked)]
     if any(noise.wanders_alone for _, noise in near):
         return near
     wandering = [term for term in search.tried if term.kind not in DRAWN]
