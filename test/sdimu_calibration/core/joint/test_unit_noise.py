@@ -69,6 +69,19 @@ def test_gauss_markov_noise_of_the_unit_has_one_time_constant():
     assert log_prior_of_set(far, USUAL) == pytest.approx(apart[1])
 
 
+def test_time_constants_of_one_unit_have_the_mean_of_their_log_odds():
+    """The sizes are known well: what is left of two priors of a size is one, and how far two may be apart."""
+    usual, width = USUAL.centre["gyro", "markov"], 1e-3
+    own = [having(usual, width, "markov", tau) for tau in (300.0, 600.0)]
+    odds = [log_odds(noise.terms[0]) for noise in own]
+    density = -0.5 * np.log(2.0 * np.pi) - np.log(USUAL.spread["gyro", "markov"])
+    apart = np.log(0.5) + sum(noise.log_prior for noise in own)
+    # Of the two sizes one is within .2 of the other, each with the width of its likelihood.
+    near = -0.5 * np.log(2.0 * np.pi * 2.0 * 0.2**2) + 2.0 * np.log(width * np.sqrt(2.0 * np.pi))
+    alike = np.log(0.5) + np.mean(odds) + density + near
+    assert log_prior_of_set(own, USUAL) == pytest.approx(np.logaddexp(apart, alike), abs=0.02)
+
+
 def test_noise_of_very_different_sizes_is_that_of_each_recording():
     usual = USUAL.centre["gyro", "flicker"]
     own = [having(usual, 0.05), having(20.0 * usual, 0.05)]

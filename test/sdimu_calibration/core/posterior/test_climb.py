@@ -9,7 +9,7 @@ import pytest
 from bare_prior import prior
 
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.posterior.climb import climbed
+from sdimu_calibration.core.posterior.climb import _without_a_family, climbed
 from sdimu_calibration.core.posterior.models import Data
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.search import WINDOW, best_from, window
@@ -121,3 +121,41 @@ def test_an_effect_that_shows_in_none_of_the_noises_beside_nothing_is_looked_for
     noises, ends, _ = climbed(board, [()])
     assert noises[0] == NARROW
     assert [k for k, _ in ends[0]] == [0]
+
+
+class Drifting(Board):
+    """Two ramps and a bias that settles, all seen in white noise; a random walk that stands for the ramps alone."""
+
+    evidence = SimpleNamespace(
+        weight=np.zeros(0),
+        candidates=[
+            SimpleNamespace(
+                family=family, effect=SimpleNamespace(bias_drift=family != "ramp", wander_like=True, scope="unit")
+            )
+            for family in ("ramp", "ramp", "settling")
+        ],
+    )
+
+    def data(self, noise):
+        offset, pull = (0.0, np.full(3, 8.0)) if noise == WHITE else (70.0, np.array([0.0, 0.0, 8.0]))
+        return offset, Data(np.eye(3), pull, prior(3))
+
+    def instead_of(self, _likeliest, _others):
+        return []
+
+    def noises(self, members, _tried=None, _rival=0.0):
+        offset, noise = (70.0, WALK) if [k for k, _ in members] == [2] else (0.0, WHITE)
+        return [(offset + self.data(noise)[1].at(members).score, noise)]
+
+
+def test_noise_is_looked_for_without_each_family_of_what_it_may_imitate():
+    board = Drifting()
+    white = best_from(board.data(WHITE)[1], ())
+    assert [k for k, _ in white[1]] == [0, 1, 2]
+    assert 70.0 + best_from(board.data(WALK)[1], ())[0] > white[0]
+    noises, ends, _ = climbed(board, [()])
+    assert noises[0] == WALK
+    assert [k for k, _ in ends[0]] == [2]
+    # Of one family alone there is no other choice than all.
+    assert _without_a_family(board, ((0, 0), (1, 0))) == []
+    assert _without_a_family(board, ((0, 0), (2, 1))) == [((2, 1),), ((0, 0),)]

@@ -67,6 +67,18 @@ def test_chosen_models_stand_for_a_window_of_more():
     assert alone.sum() == pytest.approx(1.0)
 
 
+def test_of_models_behind_the_likeliest_each_counts_by_its_probability(monkeypatch):
+    """Two stand for the six behind: one of these has a half of what is left, and is taken twice."""
+    monkeypatch.setattr(coefficients, "_MOST", 4)
+    monkeypatch.setattr(coefficients, "_LIKELIEST", 1)
+    p = [0.4, 0.35, 0.06, 0.05, 0.05, 0.05, 0.04]
+    models = [Weighed(((k, 0),), NoiseModel(), one) for k, one in enumerate(p)]
+    chosen, weight = averaged(models)
+    # Behind the first .6 in three steps of .2: their middles lie at .1, .3 and .5 of what is summed in that order.
+    assert [m.members[0][0] for m in chosen] == [0, 1, 4]
+    assert weight == pytest.approx([0.4, 0.4, 0.2])
+
+
 def test_half_of_an_equation_that_no_physics_names_moves_no_coefficient(bench):
     diagnosis = bench.diagnosis(effects=("accel_z=15*ug*sin(2*pi*t/500 + 0.7)",))
     assert diagnosis.own

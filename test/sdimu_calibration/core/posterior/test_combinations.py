@@ -61,6 +61,32 @@ def test_what_comes_in_the_place_of_two_is_no_variant_of_them():
     assert exchanged(data, ((0, 1), (1, 1)), data.at(()).score + 1.0) == []
 
 
+def test_what_happens_at_one_time_may_be_exchanged_for_other_times():
+    """A model may have several steps of one bias."""
+    rng = np.random.default_rng(7)
+    W = drawn(4, rng, alike=0.0)
+    W[:, 3] = W[:, 0] + W[:, 1] - W[:, 2]
+    data = data_of(W, 3.0 * (W[:, 0] + W[:, 1]) + rng.standard_normal(len(W)), prior(4))
+    steps = replace(data, prior=prior(4, parameter=np.zeros(4, dtype=int), repeats=np.ones(4, dtype=bool)))
+    ((one, other),) = exchanged(steps, ((0, 1), (1, 1)), steps.at(()).score + 1.0)
+    assert (one[0], other[0]) == (2, 3)
+    variants = replace(data, prior=prior(4, parameter=np.array([0, 1, 0, 1])))
+    assert exchanged(variants, ((0, 1), (1, 1)), data.at(()).score + 1.0) == []
+    twins = replace(data, prior=prior(4, twin=np.array([0, 1, 0, 3])))
+    assert exchanged(twins, ((0, 1), (1, 1)), data.at(()).score + 20.0) == []
+
+
+def test_equal_delays_of_two_accelerometers_may_be_one_of_the_triad_beside_the_third(bench):
+    diagnosis = bench.diagnosis(5, ("accel_delay_x=0.6 ms", "accel_delay_y=0.6 ms"), "recommended")
+    window = diagnosis.found.posterior
+    share = {}
+    for model in window.models:
+        delays = frozenset(one for k, _ in model.members if "delay" in (one := window.candidate(k).label))
+        share[delays] = share.get(delays, 0.0) + model.probability
+    assert share[frozenset(("accel_delay_x", "accel_delay_y"))] > 0.1
+    assert share[frozenset(("accel_delay_z", "accel_triad_delay"))] > 0.1
+
+
 def test_by_unit_force_a_cross_term_is_a_quadratic_term_with_the_other_cross_term(bench):
     """``ax^2 + ay^2 + az^2 = 1`` at rest: the three with equal sizes are a bias."""
     found = bench.diagnosis(4, ("accel_cross_square_xy=-34 ug/g^2",), "recommended")

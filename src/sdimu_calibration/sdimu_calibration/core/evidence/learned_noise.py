@@ -46,7 +46,7 @@ LEAST_GAIN = 5.0
 """Least gain of the log-likelihood (1) by a noise term: of 16 terms tried on white noise, one in two hundred tests
 reaches it."""
 _TUNING = tuple(1.25**k for k in range(-4, 5))
-"""Ratios of time constants to the one that was found: half way to its neighbours, and a quarter beyond."""
+"""Ratios of time constants to the one that was found: to its neighbours, and a fifth beyond."""
 _MOST_TERMS = 2
 """Number of noise terms of a triad at most: a test of an hour tells no more apart."""
 _SWEEPS = 3

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.evidence.learned_noise import TAU_RATIO
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes, log_odds
 
@@ -24,8 +25,8 @@ _OF_UNIT = 0.5
 _ALIKE = 0.2
 """Standard deviation of the log of a size (1) among recordings where it is of the unit: temperature and age change
 noise by a fifth."""
-_ONE_TIME = 4.0
-"""Ratio of the time constants of recordings up to which they may be one: two steps of those that are tried."""
+_ONE_TIME = TAU_RATIO**1.5
+"""Ratio (1) of the time constants of recordings up to which they may be one: a step of those that are tried."""
 _UNKNOWN = 1e-3
 """Information on a size over that of its prior (1) that stands for none: a wider posterior is rounding."""
 Kind = tuple[str, str, tuple[int, ...]]
@@ -64,13 +65,13 @@ def log_prior_of_set(own: Sequence[NoiseModel], usual: Sizes) -> float:
 
 def _one_time(tau: Sequence[float]) -> bool:
     """Whether the time constants (s) of recordings may be one; those of noise without one are zero."""
-    return max(tau) <= _ONE_TIME * min(tau)
+    return bool(max(tau) <= _ONE_TIME * min(tau))
 
 
 def _of_unit(found: Sequence[tuple[NoiseTerm, float]], usual: Sizes) -> float:
     """Log prior (1) of a kind of noise that is of the unit, by the term and its share in each recording.
 
-    Where recordings have different time constants that may be one, its odds are those in the middle.
+    Where recordings have different time constants that may be one, its log odds are the mean of theirs.
     """
     first = found[0][0]
     centre, spread = np.log(usual.centre[first.triad, first.kind]), usual.spread[first.triad, first.kind]

@@ -36,6 +36,7 @@ def climbed(
 ) -> tuple[list[NoiseModel], list[Members], list[tuple[float, NoiseModel]]]:
     """Look for noises beside the best effects, and for effects in each noise, until neither changes.
 
+    Beside effects without one family of drifts, and beside rivals, only kinds that are known are looked for.
     Where a search about nearly the same point has looked for noises beside no effects, too, it is `settled`: they are
     looked for beside the best effects, these without drifts, and those of the start, and only the kinds that were
     `tried`; all kinds without any.
@@ -65,14 +66,15 @@ def climbed(
     partly: set[Members] = set()
     for turn in range(_ROUNDS):
         beside = [members, without_drifts(board, members), *(starts if settled else [()])]
+        part = [*_without_a_family(board, members), *rivals]
         wanted = [
-            one for one in dict.fromkeys([*beside, *rivals]) if one not in asked or (one == members and one in partly)
+            one for one in dict.fromkeys([*beside, *part]) if one not in asked or (one == members and one in partly)
         ]
         if members not in wanted and not rivals:
             break
         # Few effects first: beside many that white noise asked for, noise that is far behind is given up at once.
         for one in sorted(wanted, key=len):
-            asked[one], whole = _noises_beside(board, one, tried, best, _kinds(known), one in rivals)
+            asked[one], whole = _noises_beside(board, one, tried, best, _kinds(known), one in part)
             partly = partly - {one} if whole else partly | {one}
             for score, noise in asked[one]:
                 _add(known, score, noise, one)
@@ -187,7 +189,28 @@ def _add(known: list[tuple[float, NoiseModel, Members]], score: float, noise: No
 
 def without_drifts(board: Board[E], members: Members) -> Members:
     """Leave out what noise with a memory may imitate."""
+    return tuple(m for m, family in zip(members, _drifts(board, members), strict=True) if not family)
+
+
+def _without_a_family(board: Board[E], members: Members) -> list[Members]:
+    """Leave out each family of what noise may imitate by itself, where there are several.
+
+    Ramps of two gyros are a random walk beside a bias that settles after each turn; without that, too, another kind of
+    noise stands for all.
+    """
+    of_drift = _drifts(board, members)
+    families = list(dict.fromkeys(family for family in of_drift if family))
+    return [
+        tuple(m for m, family in zip(members, of_drift, strict=True) if family != one)
+        for one in (families if len(families) > 1 else [])
+    ]
+
+
+def _drifts(board: Board[E], members: Members) -> list[str]:
+    """Family of each member that noise with a memory may imitate; nothing for the others."""
     first = len(board.evidence.weight)
-    effects = [board.evidence.candidates[column - first].effect for column in board.columns(members)]
-    drifts = [e.bias_drift or e.wander_like or e.scope == "recording" for e in effects]
-    return tuple(m for m, drift in zip(members, drifts, strict=True) if not drift)
+    candidates = [board.evidence.candidates[column - first] for column in board.columns(members)]
+    return [
+        c.family if c.effect.bias_drift or c.effect.wander_like or c.effect.scope == "recording" else ""
+        for c in candidates
+    ]

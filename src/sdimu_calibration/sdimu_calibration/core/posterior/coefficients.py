@@ -36,7 +36,7 @@ from sdimu_calibration.core.posterior.search import WINDOW
 from sdimu_calibration.core.recording import DataError
 
 _MOST = 600
-"""Number of models (1) that are averaged at most: four hundred behind the likeliest give probabilities to .025."""
+"""Number of models (1) averaged at most: with four hundred behind the likeliest probabilities scatter by .025."""
 _LIKELIEST = 200
 """Number of models (1) that are averaged with their own weights: the others of `_MOST` stand for all that follow."""
 _BESIDE = 40
@@ -214,8 +214,8 @@ class Averages:
     def _left_out(self, models: Sequence[Weighed], weight: Floats) -> Moments:
         """Say what candidates add to the moments by the part of their probability that some models lack.
 
-        With many effects that are open there are more models than can be averaged, and what is improbable in each of
-        them is in none that is. Its probability beside the likeliest is known in closed form.
+        A window holds what is improbable beside each of its models too seldom: it looks at the neighbours of the
+        likeliest alone. Its probability beside these is known in closed form.
 
         Parameters
         ----------
@@ -283,10 +283,10 @@ class Averages:
 def averaged(models: Sequence[Weighed]) -> tuple[list[Weighed], Floats]:
     """Choose models that stand for all of a window, each with its weight.
 
-    With many effects open a window holds ten thousand models. What is in one of fifty of them is in none of the
-    likeliest: a step that may have come at another time left a bias seven sigma off. Of the models behind the likeliest
-    every one has the chance of its probability to be taken, so that each effect keeps its probability but for the
-    scatter of a sample: W. Madow, "On the theory of systematic sampling", Annals of Mathematical Statistics 20 (1949).
+    With many effects open a window holds ten thousand models. A step that had come at another time with a twentieth was
+    in hardly any of the likeliest, and a bias was seven sigma off. Models behind these are taken at equal steps of the
+    sum of their probabilities, so that each effect keeps its own but for the scatter of a sample: W. Madow, "On the
+    theory of systematic sampling, II", Annals of Mathematical Statistics 20 (1949).
 
     Parameters
     ----------

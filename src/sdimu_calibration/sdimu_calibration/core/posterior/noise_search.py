@@ -229,18 +229,14 @@ def _otherwise(ranked: Sequence[_Found]) -> list[_Found]:
 
 
 def _first_without_each(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
-    """First noise that has another kind in the place of each term that wanders by itself.
+    """First noise that lacks the kind of each term that wanders by itself: another kind, or the others, made for it.
 
     A random walk stands for a ramp beside Gauss-Markov noise, which is likelier with the ramp alone.
     """
     out = dict[NoiseModel, None]()
     for term in likeliest.terms:
-        apart = (
-            noise
-            for noise in others
-            if (own := _of_triad(noise, term.triad)) and all(one.kind != term.kind for one in own)
-        )
-        first = next(apart, None)
+        own = ((noise, {one.kind for one in _of_triad(noise, term.triad)}) for noise in others)
+        first = next((noise for noise, kinds in own if kinds and term.kind not in kinds), None)
         if term.kind not in DRAWN and first is not None:
             out[first] = None
     return list(out)
@@ -257,7 +253,7 @@ def _first_of_each(likeliest: NoiseModel, others: Sequence[NoiseModel], triad: s
 def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[NoiseModel]:
     """List noises in which an effect is seen that a term of the likeliest noise stands for.
 
-    Each term may be one: the others have their sizes then, or there is another kind in the place of one that wanders.
+    Each term may be one: the others have their sizes then. What is likeliest without a kind that wanders has its own.
     Where other drawn terms come in its place, their size beside no effect has taken up the effect: they are made
     smaller.
 
@@ -274,7 +270,7 @@ def instead_of(likeliest: NoiseModel, others: Sequence[NoiseModel]) -> list[Nois
     out += _first_without_each(likeliest, others)
     for triad in TRIADS:
         out += [_smaller(noise, triad) for noise in _first_of_each(likeliest, others, triad)]
-    return out
+    return list(dict.fromkeys(out))
 
 
 def _without(noise: NoiseModel, place: int) -> NoiseModel:

@@ -35,12 +35,12 @@ def _best_width(x: float, one: Floats, other: Floats, widths: Floats, least: flo
 def best_pair(
     X: Floats, table: Floats, apart: Ints, kin: Ints, widths: Floats, more: float
 ) -> tuple[float, int, int, int]:
-    """Score every pair of candidates beside a model.
+    """Score every pair of candidates beside a model, one of which is among the first m.
 
     Parameters
     ----------
-    X : ndarray, shape (u, u)
-        Information across candidates beside the model, in units of the prior sizes.
+    X : ndarray, shape (m, u)
+        Information across the first candidates and all beside the model, in units of the prior sizes.
     table : ndarray, shape (u, 4)
         Information on each (1), its pull (1), its log odds beside the model (1), and 1 where its size cannot be
         negative.
@@ -63,7 +63,7 @@ def best_pair(
     """
     best, at_i, at_j, at_width = -np.inf, 0, 0, 0
     for i in range(len(X)):
-        for j in range(i + 1, len(X)):
+        for j in range(i + 1, len(table)):
             if apart[i, 0] == apart[j, 0] or apart[i, 1] == apart[j, 1] or apart[i, 2] == apart[j, 2]:
                 continue
             x = X[i, j]

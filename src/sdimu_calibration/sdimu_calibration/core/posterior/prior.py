@@ -120,14 +120,15 @@ class Prior:
         return self._known_odds[named]
 
     def like(self, some: Sequence[int]) -> Bools:
-        """Say which candidates are variants or twins of some, or these themselves.
+        """Say which candidates no model has beside any of some: these, their twins, variants that exclude each other.
 
         Returns
         -------
         ndarray of bool, shape (q,)
         """
         at = np.asarray(some, dtype=np.int64)
-        return np.isin(self.parameter, self.parameter[at]) | np.isin(self.twin, self.twin[at])
+        variants = np.isin(self.parameter, self.parameter[at]) & ~self.repeats
+        return variants | np.isin(self.twin, self.twin[at])
 
     def named(self, base: Sequence[int]) -> int:
         """Count the candidates of a model that are no equations."""
