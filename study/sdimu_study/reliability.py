@@ -25,6 +25,7 @@ from sdimu_calibration.core.posterior.told import of_coefficients
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS as NOISES
 from sdimu_sim.core.coloured import parse_noise
+from sdimu_study.ahead import MISSED, ahead
 from sdimu_study.noise import drawn_noise
 from sdimu_study.plans import PLANS
 from sdimu_study.score import errors
@@ -142,6 +143,7 @@ def score(world: OneTest, outcome: tuple[Diagnosis, float]) -> dict[str, Any]:
             {"text": t.text, "sigmas": t.sigmas, "p": p_family.get(_family(t), 0.0), "class": _of_class(found, t)}
             for t in world.truths
         ],
+        "ahead": ahead(window, [t.name for t in world.truths]),
         "seconds": seconds,
         **errors(found.after, world.sensor),
     }
@@ -206,6 +208,10 @@ def _wrong(least: float) -> Any:
     return lambda g: of(sum(p > least for row in g.good for _, p in row["wrong"]), len(g.good))
 
 
+def _missed(g: Group) -> str:
+    return of(g.count(lambda row: row["ahead"] > MISSED), len(g.good))
+
+
 def _beyond(g: Group) -> str:
     return of(g.count(lambda row: row["largest_z"] > 6.0), len(g.good))
 
@@ -227,6 +233,7 @@ STUDY = Study(
         ("wrong > .9", _wrong(0.9)),
         ("RMS z", lambda g: f"{rms_z(g.good):.2f}" if g.good else ""),
         ("beyond 6", _beyond),
+        ("missed", _missed),
         ("s", lambda g: f"{np.median([row['seconds'] for row in g.good]) if g.good else np.nan:.1f}"),
     ),
 )
