@@ -87,8 +87,8 @@ def wheels_for(python: str, pins: list[str]) -> tuple[list[Package], list[str]]:
     while True:
         try:
             left = [pin for pin in pins if pin not in absent]
-            # pip takes 3.11 for 3.11.0, and some files ask for a later patch of it.
-            return asked(left, "--only-binary=:all:", "--python-version", f"{python}.99"), absent
+            # The first patch of it, as distributions have early ones: Debian 12 has 3.11.2.
+            return asked(left, "--only-binary=:all:", "--python-version", f"{python}.0"), absent
         except RuntimeError as error:  # noqa: PERF203 (pip names one at a time)
             found = _ABSENT.search(str(error))
             if found is None or found.group(1) not in pins:
@@ -113,6 +113,8 @@ def main() -> None:
     for python in PYTHONS:
         found, absent = wheels_for(python, [pin for pin in everything if pin not in sources])
         files += found
+        if absent and python == PYTHONS[0]:
+            raise SystemExit(f"{', '.join(absent)}: no file for Python {python}.0; install an older version into .venv")
         for pin in absent:
             markers[pin] += f' ; python_version != "{python}"'
     hashes: dict[str, set[str]] = {pin: set() for pin in everything}
