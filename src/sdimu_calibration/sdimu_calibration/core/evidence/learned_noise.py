@@ -181,15 +181,20 @@ def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseT
     """Fit the time constants of Markov terms between those that were tried; the intervals of the sizes take them in."""
     out = list(terms)
     for place, term in enumerate(terms):
-        if not term.tau:
-            continue
-        given = information.of_triad(term.triad, [t for t in out if t is not term], cut)
-        tried = [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING]
-        near = _best_sizes(given, cut, tried)
-        best = max(near, key=lambda t: t.gain)
-        likely = [t for t in near if t.gain > best.gain - _INTERVAL]
-        out[place] = replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
+        if term.tau:
+            out[place] = _over_times(information, cut, [t for t in out if t is not term], term)
     return tuple(out)
+
+
+def _over_times(
+    information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm
+) -> NoiseTerm:
+    """Best size of a Markov term, of the time constants near its own; the interval holds those of all likely ones."""
+    given = information.of_triad(term.triad, others, cut)
+    near = _best_sizes(given, cut, [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING])
+    best = max(near, key=lambda t: t.gain)
+    likely = [t for t in near if t.gain > best.gain - _INTERVAL]
+    return replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
 
 
 def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
@@ -205,11 +210,16 @@ def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[No
 
 
 def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
-    """Put 95 % intervals to the sizes of terms, and what each adds to the log-likelihood; the sizes stay."""
+    """Put 95 % intervals to the sizes of terms, and what each adds to the log-likelihood; the sizes stay.
+
+    That of a Markov term holds the sizes at all likely time constants near its own.
+    """
     out = []
     for term in terms:
-        best = _alone(information, cut, [t for t in terms if t is not term], term)
-        out.append(replace(term, low=min(best.low, term.size), high=max(best.high, term.size), gain=best.gain))
+        others = [t for t in terms if t is not term]
+        best = _alone(information, cut, others, term)
+        ends = _over_times(information, cut, others, term) if term.tau else best
+        out.append(replace(term, low=min(ends.low, term.size), high=max(ends.high, term.size), gain=best.gain))
     return tuple(out)
 
 
