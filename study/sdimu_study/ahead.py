@@ -56,7 +56,8 @@ def _holding(data: Data, places: Sequence[Sequence[int]]) -> tuple[float, Member
     members: Members = ()
     for variants in [*places, *places]:
         others = tuple(member for member in members if member[0] not in variants)
-        trials = [_sorted((*others, (number, width))) for number in variants for width in range(len(WIDTHS))]
+        more = [(number, width) for number in variants for width in range(len(WIDTHS))]
+        trials = [tuple(sorted((*others, one))) for one in more]
         members = max((data.at(one).of_any_sign, one) for one in trials)[1]
     while members:
         fewer = max((data.at(one).score, one) for one in (members[:k] + members[k + 1 :] for k in range(len(members))))
@@ -64,7 +65,3 @@ def _holding(data: Data, places: Sequence[Sequence[int]]) -> tuple[float, Member
             break
         members = fewer[1]
     return data.at(members).score, members
-
-
-def _sorted(members: Sequence[tuple[int, int]]) -> Members:
-    return tuple(sorted(members))

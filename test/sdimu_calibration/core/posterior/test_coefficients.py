@@ -17,13 +17,16 @@ from sdimu_calibration.core.posterior.search import WINDOW
 
 
 def test_moments_over_all_models_are_those_of_the_mixture(bench, monkeypatch):
-    # Without what the averaged models lack.
+    # Without what the averaged models lack, and with few models, so that some stand for others.
     monkeypatch.setattr(coefficients, "_LEAST_LACKING", 1.0)
+    monkeypatch.setattr(coefficients, "_MOST", 60)
+    monkeypatch.setattr(coefficients, "_LIKELIEST", 20)
     hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_warm_up_y(tau=300 s)=0.07 deg/h")
     diagnosis = bench.diagnosis(12, hidden, "recommended")
     found = diagnosis.found.posterior
     averages = Averages(found.board, diagnosis.fit.dwell_means)
     told, (models, weight) = averages.of(found), averaged(found.models)
+    assert len(models) < len(found.models)
     each = [averages.of_model(m.members, m.noise) for m in models]
     mean = sum(w * one.mean for w, one in zip(weight, each, strict=True))
     second = sum(w * (one.covariance + np.outer(one.mean, one.mean)) for w, one in zip(weight, each, strict=True))
@@ -68,7 +71,7 @@ def test_chosen_models_stand_for_a_window_of_more():
 
 
 def test_of_models_behind_the_likeliest_each_counts_by_its_probability(monkeypatch):
-    """Two stand for the six behind: one of these has a half of what is left, and is taken twice."""
+    """Two stand for the six behind: one of these has more than a half of what is left, and is taken twice."""
     monkeypatch.setattr(coefficients, "_MOST", 4)
     monkeypatch.setattr(coefficients, "_LIKELIEST", 1)
     p = [0.4, 0.35, 0.06, 0.05, 0.05, 0.05, 0.04]

@@ -48,7 +48,7 @@ STATED_SPREAD = 1.0
 USUAL_SPREAD = 2.3
 """Standard deviation of the log of a size where no data sheet states one (1): a factor of ten."""
 MARKOV_S = 300.0
-"""Usual time constant of Gauss-Markov noise (s): minutes, in sensors of all grades."""
+"""Usual time constant of Gauss-Markov noise (s): an estimate, about what the simulated worlds draw (100 to 1000 s)."""
 MARKOV_SPREAD = 1.2
 """Standard deviation of the log of that time constant about the usual one (1): a factor of three."""
 INSTABILITY: Mapping[str, Mapping[str, float]] = {
