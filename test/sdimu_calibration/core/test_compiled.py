@@ -20,6 +20,21 @@ CORE = Path(sdimu_calibration.core.__file__).parent
 PACKAGE = "sdimu_calibration.core"
 
 
+CONSTANTS = """
+from sdimu_calibration.core.compiled import compiled
+
+
+@compiled
+def times(x, count):
+    return x * count
+
+
+@compiled
+def both(x):
+    return times(x, 3) + times(x, count=5)
+"""
+
+
 def compiled_files():
     return [f for f in sorted(CORE.rglob("*.py")) if "@compiled" in f.read_text(encoding="utf-8")]
 
@@ -138,6 +153,15 @@ def test_an_edited_kernel_compiles_only_the_kernels_that_use_it(tmp_path, monkey
     assert run() == [4, 3, 1, 1]
     one.write_text(one.read_text().replace("x + 1", "x + 1000"))
     assert run() == [2002, 3, 0, 1], "the kernel that uses the edited one is compiled anew, the other is not"
+
+
+def test_a_function_called_with_several_constants_is_compiled_once(tmp_path, monkeypatch):
+    script = tmp_path / "constants.py"
+    script.write_text(CONSTANTS)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    names = runpy.run_path(str(script))
+    assert names["both"](2.0) == 2.0 * 3 + 2.0 * 5
+    assert [[str(kind) for kind in kinds] for kinds in names["times"].overloads] == [["float64", "int64"]]
 
 
 def test_a_copy_is_compiled_once_most_kernels_are_kept(tmp_path, monkeypatch):

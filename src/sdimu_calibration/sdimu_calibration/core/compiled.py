@@ -24,7 +24,9 @@ with lean():
     from llvmlite import binding
     from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
     from numba.core.codegen import JITCodeLibrary
+    from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
+    from numba.core.types.misc import unliteral
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -33,6 +35,9 @@ _PATIENCE_S = 120.0
 
 _MOST_LOOPS = 50
 """Number of compiled loops (1) from which a run hardly waits for others: a test, its fit and its diagnosis need 70."""
+
+_HOW = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
+"""How numba compiles: without the global lock, without a form for callers in C; a division by zero gives inf or NaN."""
 
 _IMPORT = re.compile(rb"^from ((?:sdimu_|rate_table_sim)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 """An import from one of the three packages at the start of a line: module, names."""
@@ -133,6 +138,15 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     def _found(self, sig: Any, target_context: Any) -> Any:
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
+
+
+class _Function(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function. Numba alone compiles it anew for each constant that another compiled function gives it."""
+
+    def get_call_template(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return super().get_call_template(
+            tuple(map(unliteral, args)), {name: unliteral(kind) for name, kind in kws.items()}
+        )
 
 
 class _Turn:
@@ -246,9 +260,10 @@ def compiled(function: F) -> F:
     place = file.parent / "__pycache__"
     if "NUMBA_CACHE_DIR" not in os.environ and os.access(file.parent, os.W_OK):
         numba.config.CACHE_DIR = str(place / f"numba-{_digest(file)}")
-    compiled_one = numba.njit(nogil=True, error_model="numpy")(function)
-    if not numba.config.DISABLE_JIT:
-        compiled_one._cache = _Cache(function)
+    if numba.config.DISABLE_JIT:
+        return function
+    compiled_one = _Function(function, targetoptions=_HOW)
+    compiled_one._cache = _Cache(function)
     return cast(F, compiled_one)
 
 
