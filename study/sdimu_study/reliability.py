@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -26,6 +26,7 @@ from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS as NOISES
 from sdimu_sim.core.coloured import parse_noise
 from sdimu_study.ahead import MISSED, ahead
+from sdimu_study.believed import BelievedEffects, believed_count, believed_noise
 from sdimu_study.noise import drawn_noise
 from sdimu_study.plans import PLANS
 from sdimu_study.score import errors
@@ -43,10 +44,10 @@ from sdimu_study.worlds import (
     with_effects,
 )
 
-CLEAN, NOISE, ONE, MANY, MIXED = "clean", "noise", "one", "many", "mixed"
-KINDS = (CLEAN, NOISE, ONE, MANY, MIXED)
+CLEAN, NOISE, ONE, MANY, MIXED, BELIEVED = "clean", "noise", "one", "many", "mixed", "believed"
+KINDS = (CLEAN, NOISE, ONE, MANY, MIXED, BELIEVED)
 """Nothing hidden in white noise; noise with a memory alone; it with one effect of 5 or 10 sigma; 5 to 12 effects in
-white noise; none to twelve in either."""
+white noise; none to twelve in either; effects and noise as the prior of the diagnosis has them."""
 RATES_HZ = (20.0, 50.0, 100.0)
 """Sample rates that are drawn (Hz)."""
 _TELLING = ("kim18_signed", "recommended")
@@ -80,10 +81,15 @@ def world(case: ReliabilityCase, seed: int) -> OneTest:
     site, rate_hz, own = drawn_site(rng), float(rng.choice(RATES_HZ)), int(rng.integers(2**31))
     coloured = not handheld and (case.kind in {NOISE, ONE} or (case.kind == MIXED and rng.random() < 0.5))
     noise = drawn_noise(imu, str(rng.choice(sorted(NOISES))), rng) if coloured else ()
+    if case.kind == BELIEVED:
+        noise = () if handheld else believed_noise(imu, rng)
     true = [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
     count = _count(case.kind, rng, handheld)
     sizes = _SPAN.get(case.kind, (1.0, 1.0))
     spans = [(float(rng.choice(sizes)),) * 2 if case.kind == ONE else sizes for _ in range(count)]
+    draws: list[Callable[[Fit], Truth]] = [partial(_drawn, rng, span, true) for span in spans]
+    if case.kind == BELIEVED:
+        draws = [BelievedEffects(rng, true, _TOLD_BEFORE)] * count
 
     def simulated(effects: tuple[str, ...], noise: tuple[str, ...] = noise) -> Any:
         return simulated_test(case.imu, imu, plan, site, own, effects, noise, rate_hz)
@@ -91,7 +97,7 @@ def world(case: ReliabilityCase, seed: int) -> OneTest:
     return with_effects(
         simulated,
         model_of(case.imu),
-        [partial(_drawn, rng, span, true) for span in spans],
+        draws,
         {"plan": plan, "latitude_deg": math.degrees(site.latitude_rad), "rate_hz": rate_hz, "coloured": list(noise)},
         clean=lambda: simulated((), ()),
     )
@@ -109,6 +115,8 @@ def _count(kind: str, rng: np.random.Generator, handheld: bool) -> int:
         return 0
     if kind == ONE:
         return 1
+    if kind == BELIEVED:
+        return believed_count(rng)
     if kind == MANY:
         return int(rng.integers(5, 13))
     return int(rng.integers(1, _MOST_BY_HAND + 1 if handheld else 13)) if rng.random() < 0.7 else 0
@@ -240,8 +248,8 @@ STUDY = Study(
 
 
 def kinds_of(imu: str, asked: Sequence[str]) -> list[str]:
-    """Kinds of worlds of an IMU file: runs by hand are clean or mixed, as no noise is drawn for them."""
-    return [kind for kind in asked if imu != HANDHELD or kind in {CLEAN, MIXED}]
+    """Kinds of worlds of an IMU file: runs by hand are clean, mixed or believed, as no noise is drawn for them."""
+    return [kind for kind in asked if imu != HANDHELD or kind in {CLEAN, MIXED, BELIEVED}]
 
 
 def _rows(results: Results) -> list[Mapping[str, Any]]:
