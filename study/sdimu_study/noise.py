@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.noise_search import SEEN
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
@@ -110,6 +114,33 @@ def drawn_noise(imu: ImuSpecification, kind: str, rng: np.random.Generator) -> t
 def noise_terms(noise: Sequence[str]) -> list[NoiseTerm]:
     """Noise of a scenario as terms of the estimator, with their true sizes."""
     return [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
+
+
+def seen_noise(found: Posterior[LinearEvidence], true: Sequence[NoiseTerm]) -> list[NoiseTerm]:
+    """Take those terms that a test of this noise can see: less than `SEEN` is the prior of their size.
+
+    The log-likelihood that a term gains beside the others is in the mean ``1/2 sum(l - log(1 + l))``, with l the
+    eigenvalues of its covariance times the information on the errors in the noise of the others.
+
+    Parameters
+    ----------
+    found : Posterior
+        Of the test: its told effects are estimated along.
+    true : sequence of NoiseTerm
+        Noise of the test, with its true sizes.
+    """
+    board = found.board
+    if board.joint is None or board.wander is None:
+        return list(true)
+    J, cut, seen = board.joint.on_wander(*board.parameters(found.told.members)).J, board.wander.cut, []
+    for place, term in enumerate(true):
+        R, others = root_of([term], cut), root_of([*true[:place], *true[place + 1 :]], cut)
+        across = others.T @ J @ R
+        taken = across.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ J @ others, across)
+        shown = np.maximum(np.linalg.eigvalsh(R.T @ J @ R - taken), 0.0)
+        if 0.5 * float(np.sum(shown - np.log1p(shown))) >= SEEN:
+            seen.append(term)
+    return seen
 
 
 def _seen(g: Group) -> str:

@@ -24,10 +24,9 @@ from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import of_coefficients
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS as NOISES
-from sdimu_sim.core.coloured import parse_noise
 from sdimu_study.ahead import MISSED, ahead
 from sdimu_study.believed import BelievedEffects, believed_count, believed_noise
-from sdimu_study.noise import drawn_noise
+from sdimu_study.noise import drawn_noise, noise_terms, seen_noise
 from sdimu_study.plans import PLANS
 from sdimu_study.score import errors
 from sdimu_study.study import Group, Results, Rows, Study, Table, head, of, rms_z
@@ -54,6 +53,8 @@ _TELLING = ("kim18_signed", "recommended")
 """Plans that show most of the catalogue, for many effects at once."""
 _SPAN = {ONE: (5.0, 10.0), MANY: (3.0, 50.0), MIXED: (2.0, 50.0)}
 """Least and largest size of an effect, in the sigma of the clean test."""
+_LEAST_SEEN = 2.0
+"""Least size (sigma of the clean test) of an effect that counts as missing: less moves hardly anything."""
 _TOLD_BEFORE = frozenset({"gyro_lost_data"})
 """What the screening of the samples finds, takes for missing data and notes before any model is weighed."""
 _MOST_BY_HAND = 3
@@ -83,7 +84,7 @@ def world(case: ReliabilityCase, seed: int) -> OneTest:
     noise = drawn_noise(imu, str(rng.choice(sorted(NOISES))), rng) if coloured else ()
     if case.kind == BELIEVED:
         noise = () if handheld else believed_noise(imu, rng)
-    true = [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
+    true = noise_terms(noise)
     count = _count(case.kind, rng, handheld)
     sizes = _SPAN.get(case.kind, (1.0, 1.0))
     spans = [(float(rng.choice(sizes)),) * 2 if case.kind == ONE else sizes for _ in range(count)]
@@ -134,15 +135,15 @@ def score(world: OneTest, outcome: tuple[Diagnosis, float]) -> dict[str, Any]:
     told, window = found.probabilities, found.found.posterior
     if told is None or window is None:
         raise ValueError("a diagnosis without probabilities")
-    there = {_family(t) for t in world.truths}
-    names = {t.name for t in world.truths}
-    noise = {f"{key.triad} {key.kind}" for key in map(parse_noise, world.told["coloured"])}
+    missing = [t for t in world.truths if t.sigmas >= _LEAST_SEEN]
+    there, names = {_family(t) for t in missing}, {t.name for t in missing}
+    noise = {f"{term.triad} {term.kind}" for term in seen_noise(window, noise_terms(world.told["coloured"]))}
     p_family = {(f.family, f.sensor): f.probability for f in told.families}
     return {
         **world.told,
         "verdict": found.verdict,
         "sentence": found.sentence,
-        "nothing": [(told.nothing, not world.truths)],
+        "nothing": [(told.nothing, not missing)],
         "families": [(p, key in there) for key, p in p_family.items()],
         "effects": [(one.probability, one.name in names) for one in of_coefficients(window)],
         "noise": [(one.probability, f"{one.triad} {one.kind}" in noise) for one in told.noise],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,8 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
-from sdimu_study.noise import STUDY, NoiseCase, page
-from sdimu_study.worlds import drawn_effect, simulated_test
+from sdimu_study.noise import STUDY, NoiseCase, page, seen_noise
+from sdimu_study.worlds import OneTest, diagnosed, drawn_effect, simulated_test
 
 
 def test_an_effect_of_ten_sigma_is_larger_where_noise_wanders():
@@ -41,6 +43,21 @@ def test_the_page_counts_what_was_hidden_apart_from_what_is_not_there():
     ]
     last = page({("dtg", "flicker"): rows}, 1).splitlines()[-1]
     assert last == "| dtg | flicker | 1 of 4 | 1 of 1 | 1 of 1 | 1 of 2 | 1 of 2 | 1.00 | 1 |"
+
+
+def test_noise_is_seen_where_it_gains_likelihood_beside_the_other_terms():
+    imu = load_imu("dtg")
+    test, sensor = simulated_test("dtg", imu, "kim18_10_min", Site(0.6, 0.0), 5, ())
+    found = diagnosed(OneTest(test, load_model("baseline"), sensor)).found.posterior
+    unit = np.deg2rad(1.0) / 3600.0
+    strong, weak = (NoiseTerm("gyro", "flicker", size=size * unit) for size in (1.0, 1e-5))
+    slower, other = NoiseTerm("gyro", "markov", 900.0, 0.1 * unit), NoiseTerm("accel", "shift", size=1e-9)
+    assert seen_noise(found, []) == []
+    assert seen_noise(found, [strong, weak, other]) == [strong]
+    # What a strong term of the same triad covers is not seen; alone it is.
+    faint = replace(slower, size=0.05 * unit)
+    assert seen_noise(found, [faint]) == [faint]
+    assert seen_noise(found, [strong, faint]) == [strong]
 
 
 @pytest.mark.slow

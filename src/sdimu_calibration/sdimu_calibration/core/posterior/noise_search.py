@@ -33,7 +33,7 @@ _SHARES = (0.3, 0.7)
 less than the second."""
 _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
-_SEEN = 0.5
+SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
 _MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
@@ -113,7 +113,7 @@ class _Search:
             return None
         log_posterior = gain + self.usual.log_density(term, size)
         best = int(np.argmax(log_posterior))
-        if gain[best] < _SEEN:
+        if gain[best] < SEEN:
             return None
         step = np.gradient(np.log(size))
         log_mass = float(log_posterior[best] + np.log(np.sum(np.exp(log_posterior - log_posterior[best]) * step)))
