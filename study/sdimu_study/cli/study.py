@@ -209,7 +209,7 @@ def reliability(
     seed: Seed = 81_001,
     imu: Imus = None,
     kind: Annotated[
-        list[str] | None, typer.Option(help="clean, noise, one, many, mixed; repeatable. All by default.")
+        list[str] | None, typer.Option(help="clean, noise, one, many, mixed, believed; repeatable. All by default.")
     ] = None,
     workers: Workers = 2,
 ) -> None:

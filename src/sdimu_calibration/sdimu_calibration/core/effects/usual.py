@@ -3,7 +3,8 @@
 Relative to an effect that is known but stands in few data sheets, which has 1. Sources: data sheets and test standards
 of inertial sensors list what is usual (IEEE Std 1293 for accelerometers: bias, scale, K2, K3, cross coupling,
 asymmetry; IEEE Std 952 and 813 for gyros: asymmetry and nonlinearity of the scale factor, temperature, warm-up,
-g-sensitivity). What a mount or a cable does, and what needs a strong field, is found in few tests.
+g-sensitivity; bandwidth and group delay of both). What a mount or a cable does, and what needs a strong field, is found
+in few tests.
 """
 
 from __future__ import annotations
@@ -23,11 +24,14 @@ _USUAL = {
             "accel_bias_temperature",
             "accel_scale_temperature",
             "accel_bias_warm_up",
+            "accel_delay",
             "accel_size",
+            "accel_triad_delay",
             "gyro_scale_asymmetry",
             "gyro_bias_temperature",
             "gyro_scale_temperature",
             "gyro_bias_warm_up",
+            "gyro_delay",
             "gyro_g_sensitivity",
             "lever_arm",
         ),
