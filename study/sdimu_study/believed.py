@@ -1,19 +1,22 @@
-"""Worlds as the diagnosis believes them: effects and noise of its prior, made by the simulator.
+"""Worlds as the diagnosis believes them: effects and noise drawn from its prior, made by the simulator.
 
-In such worlds all that is told must come true. Where it does, what is told wrongly elsewhere is of the prior; where it
-does not, of the search or of the likelihood. Source: S. Talts et al., "Validating Bayesian inference algorithms with
+In such worlds probabilities must come true. If they do, probabilities that do not come true in other worlds are a
+matter of the prior; if they do not, of the search or of the likelihood. Effects that the simulator does not have, a
+fifth of the prior, are drawn and left out; that effects of one cause on several axes are likelier together counts in
+which ones are drawn, and not in how many. Source: S. Talts et al., "Validating Bayesian inference algorithms with
 simulation-based calibration", arXiv 1804.06788 (2018).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.candidates import catalogue
+from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.diagnosis.ground import Request, fresh_ground
 from sdimu_calibration.core.diagnosis.scan import scan
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -25,8 +28,8 @@ from sdimu_calibration.core.posterior.prior import MEAN_NUMBER, WIDTH_SHARES, WI
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 from sdimu_sim.core.coloured import KINDS
-from sdimu_sim.core.hidden import one_sided, size_unit
-from sdimu_study.worlds import Truth, hideable_names, option_of
+from sdimu_sim.core.hidden import effect_names, one_sided, size_unit
+from sdimu_study.worlds import Truth, option_of
 
 _MOST_TERMS = 2
 """Number of noise terms of a triad at most (1), as a diagnosis looks for them."""
@@ -37,8 +40,11 @@ def believed_count(rng: np.random.Generator) -> int:
     return int(rng.poisson(rng.exponential(MEAN_NUMBER)))
 
 
-def believed_noise(imu: ImuSpecification, rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw noise with a memory: each kind that the simulator has with its odds, of a usual size for the IMU."""
+def believed_noise(imu: ImuSpecification, duration_s: float, rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw noise with a memory: each kind of the simulator with its odds, two terms a triad at most, of usual sizes.
+
+    Gauss-Markov noise of more than a third of the test is left out, as a diagnosis does not look for it.
+    """
     usual, out = usual_sizes(imu), []
     for triad, unit in zip(TRIADS, ("deg/h", "ug"), strict=True):
         kinds: list[str] = list(KINDS)
@@ -47,70 +53,69 @@ def believed_noise(imu: ImuSpecification, rng: np.random.Generator) -> tuple[str
         for kind in kinds:
             size = usual.centre[triad, kind] * float(np.exp(usual.spread[triad, kind] * rng.standard_normal()))
             shown = f"{unit}/sqrt(h)" if kind == RANDOM_WALK else unit
-            tau = f"(tau={MARKOV_S * float(np.exp(MARKOV_SPREAD * rng.standard_normal())):.0f} s)"
-            out.append(f"{triad}_noise_{kind}{tau if kind == MARKOV else ''}={float(from_si(size, shown)):.5g} {shown}")
+            tau_s = MARKOV_S * float(np.exp(MARKOV_SPREAD * rng.standard_normal()))
+            time = f"(tau={tau_s:.0f} s)" if kind == MARKOV else ""
+            if kind != MARKOV or tau_s < duration_s / 3.0:
+                out.append(f"{triad}_noise_{kind}{time}={float(from_si(size, shown)):.5g} {shown}")
     return tuple(out)
 
 
-@dataclass
 class BelievedEffects:
     """Draws the effects of one world one after another, each beside those before it.
 
-    Attributes
+    Parameters
     ----------
     rng : Generator
     noise : sequence of NoiseTerm
         Noise with a memory that the sigmas of the truths count.
-    told_before : collection of str
-        Families that are left out.
+    left_out : collection of str
+        Families that are not hidden.
     """
 
-    rng: np.random.Generator
-    noise: Sequence[NoiseTerm]
-    told_before: Collection[str] = ()
+    def __init__(self, rng: np.random.Generator, noise: Sequence[NoiseTerm], left_out: Collection[str] = ()) -> None:
+        self._rng, self._noise, self._left_out = rng, noise, left_out
+        self._prepared: tuple[Board[LinearEvidence], Floats] | None = None
+        self._places: list[int] = []
 
-    def __post_init__(self) -> None:
-        self._board: Board[LinearEvidence] | None = None
-        self._drawn: list[int] = []
-
-    def __call__(self, fit: Fit) -> Truth:
-        """Draw the next effect.
+    def __call__(self, fit: Fit) -> Truth | None:
+        """Draw the next effect; None where it is one that is not hidden, or that the simulator does not have.
 
         Parameters
         ----------
         fit : Fit
             Of the clean test.
         """
-        if self._board is None:
-            self._prepare(fit)
-        board, rng = self._board, self.rng
-        assert board is not None
-        odds = board.prior.log_more(sorted(self._drawn)) + self._possible
+        self._prepared = self._prepared or _prepared(fit, self._noise)
+        (board, sigma), rng = self._prepared, self._rng
+        odds = board.prior.log_more(sorted(self._places))
         share = np.exp(odds - odds.max())
-        k = int(rng.choice(len(share), p=share / share.sum()))
-        self._drawn.append(k)
-        column = int(board.use[k])
+        place = int(rng.choice(len(share), p=share / share.sum()))
+        self._places.append(place)
+        width, unit = float(rng.choice(WIDTHS, p=WIDTH_SHARES)), float(board.size[place])
+        value = unit * width * float(rng.standard_normal())
+        column = int(board.use[place])
         candidate = board.evidence.candidate(column)
         name = candidate.parameter.name
-        width = float(rng.choice(WIDTHS, p=WIDTH_SHARES))
-        value = float(board.size[k]) * width * float(rng.standard_normal())
+        if name not in effect_names() or candidate.family in self._left_out:
+            return None
         value = abs(value) if one_sided(name) or candidate.effect.positive else value
-        sigmas = abs(value) / float(self._sigma[column])
         text = sized(candidate.label, value, size_unit(name))
-        return Truth(name, candidate.family, option_of(candidate.label), value, sigmas, text)
+        return Truth(name, candidate.family, option_of(candidate.label), value, abs(value) / float(sigma[column]), text)
 
-    def _prepare(self, fit: Fit) -> None:
-        """Take the evidence of the clean test, with all that may be in a model."""
-        known = catalogue(fit.timetable, set(fit.labels), has_temperature=False)
-        known = [e for e in known if not (fit.learns_scatter and (e.options or e.needs_table))]
-        evidence = fit.evidence(known)
-        p = len(evidence.weight)
-        self._board = Board(evidence, np.arange(p, p + len(evidence.candidates)), frozenset(), None)
-        names = hideable_names()
-        candidates = [evidence.candidate(int(column)) for column in self._board.use]
-        can = [c.parameter.name in names and c.family not in self.told_before for c in candidates]
-        self._possible = np.where(can, 0.0, -np.inf)
-        noisy = evidence
-        if self.noise:
-            noisy = evidence.with_noise(wander_in(fit.evidence(), self.noise).modes(self.noise).columns)
-        self._sigma = scan(noisy.information, noisy.model, noisy.weight).sigma
+
+def _prepared(fit: Fit, noise: Sequence[NoiseTerm]) -> tuple[Board[LinearEvidence], Floats]:
+    """Take all that may be in a model of the clean test.
+
+    Returns
+    -------
+    board : Board
+        With the candidates of a diagnosis.
+    sigma : ndarray, shape (columns,)
+        Of each column of its evidence in the noise (SI).
+    """
+    ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), own=False)
+    noisy = ground.evidence
+    if noise:
+        noisy = noisy.with_noise(wander_in(fit.evidence(), noise).modes(noise).columns)
+    sigma = scan(noisy.information, noisy.model, noisy.weight).sigma
+    return Board(ground.evidence, ground.allowed, frozenset(), None), sigma

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_search import SEEN
-from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model
@@ -116,31 +117,40 @@ def noise_terms(noise: Sequence[str]) -> list[NoiseTerm]:
     return [NoiseTerm(key.triad, key.kind, key.tau, key.size) for key in map(parse_noise, noise)]
 
 
-def seen_noise(found: Posterior[LinearEvidence], true: Sequence[NoiseTerm]) -> list[NoiseTerm]:
-    """Take those terms that a test of this noise can see: less than `SEEN` is the prior of their size.
+def seen_noise(board: Board[LinearEvidence], true: Sequence[NoiseTerm]) -> list[NoiseTerm]:
+    """Take the terms that a test of this noise can see. A term that gains less likelihood is left to its prior.
 
-    The log-likelihood that a term gains beside the others is in the mean ``1/2 sum(l - log(1 + l))``, with l the
-    eigenvalues of its covariance times the information on the errors in the noise of the others.
+    Terms are added one by one, as a search adds them, with no effect estimated: whichever gains most beside those
+    before it, down to a gain of `SEEN` in the mean over tests. The mean gain of log-likelihood is ``1/2 sum(l - log(1 +
+    l))``, with l the eigenvalues of the covariance of the term times the information on the errors in the noise of the
+    others.
 
     Parameters
     ----------
-    found : Posterior
-        Of the test: its told effects are estimated along.
+    board : Board
+        Of a diagnosis of the test.
     true : sequence of NoiseTerm
         Noise of the test, with its true sizes.
     """
-    board = found.board
     if board.joint is None or board.wander is None:
         return list(true)
-    J, cut, seen = board.joint.on_wander(*board.parameters(found.told.members)).J, board.wander.cut, []
-    for place, term in enumerate(true):
-        R, others = root_of([term], cut), root_of([*true[:place], *true[place + 1 :]], cut)
-        across = others.T @ J @ R
-        taken = across.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ J @ others, across)
-        shown = np.maximum(np.linalg.eigvalsh(R.T @ J @ R - taken), 0.0)
-        if 0.5 * float(np.sum(shown - np.log1p(shown))) >= SEEN:
-            seen.append(term)
+    J, cut, seen = board.joint.on_wander(*board.parameters(())).J, board.wander.cut, list[NoiseTerm]()
+    while left := [term for term in true if term not in seen]:
+        others = root_of(seen, cut)
+        gain = [_mean_gain(J, root_of([term], cut), others) for term in left]
+        best = int(np.argmax(gain))
+        if gain[best] < SEEN:
+            break
+        seen.append(left[best])
     return seen
+
+
+def _mean_gain(J: Floats, root: Floats, others: Floats) -> float:
+    """Log-likelihood (1) that noise of a root gains in the mean beside that of other roots."""
+    across = others.T @ J @ root
+    taken = across.T @ np.linalg.solve(np.eye(others.shape[1]) + others.T @ J @ others, across)
+    shown = np.maximum(np.linalg.eigvalsh(root.T @ J @ root - taken), 0.0)
+    return 0.5 * float(np.sum(shown - np.log1p(shown)))
 
 
 def _seen(g: Group) -> str:

@@ -22,12 +22,14 @@ from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import of_coefficients
+from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS as NOISES
 from sdimu_study.ahead import MISSED, ahead
 from sdimu_study.believed import BelievedEffects, believed_count, believed_noise
 from sdimu_study.noise import drawn_noise, noise_terms, seen_noise
-from sdimu_study.plans import PLANS
+from sdimu_study.plans import PLANS, study_plan
 from sdimu_study.score import errors
 from sdimu_study.study import Group, Results, Rows, Study, Table, head, of, rms_z
 from sdimu_study.worlds import (
@@ -53,8 +55,9 @@ _TELLING = ("kim18_signed", "recommended")
 """Plans that show most of the catalogue, for many effects at once."""
 _SPAN = {ONE: (5.0, 10.0), MANY: (3.0, 50.0), MIXED: (2.0, 50.0)}
 """Least and largest size of an effect, in the sigma of the clean test."""
-_LEAST_SEEN = 2.0
-"""Least size (sigma of the clean test) of an effect that counts as missing: less moves hardly anything."""
+_LEAST_SIGMAS = 2.0
+"""Least size (sigma of the clean test) of an effect that counts as missing: smaller ones cannot be seen, and no window
+of models holds them with the probability that they have before the data."""
 _TOLD_BEFORE = frozenset({"gyro_lost_data"})
 """What the screening of the samples finds, takes for missing data and notes before any model is weighed."""
 _MOST_BY_HAND = 3
@@ -83,12 +86,12 @@ def world(case: ReliabilityCase, seed: int) -> OneTest:
     coloured = not handheld and (case.kind in {NOISE, ONE} or (case.kind == MIXED and rng.random() < 0.5))
     noise = drawn_noise(imu, str(rng.choice(sorted(NOISES))), rng) if coloured else ()
     if case.kind == BELIEVED:
-        noise = () if handheld else believed_noise(imu, rng)
+        noise = () if handheld else believed_noise(imu, study_plan(plan, own).duration_s, rng)
     true = noise_terms(noise)
     count = _count(case.kind, rng, handheld)
     sizes = _SPAN.get(case.kind, (1.0, 1.0))
     spans = [(float(rng.choice(sizes)),) * 2 if case.kind == ONE else sizes for _ in range(count)]
-    draws: list[Callable[[Fit], Truth]] = [partial(_drawn, rng, span, true) for span in spans]
+    draws: list[Callable[[Fit], Truth | None]] = [partial(_drawn, rng, span, true) for span in spans]
     if case.kind == BELIEVED:
         draws = [BelievedEffects(rng, true, _TOLD_BEFORE)] * count
 
@@ -135,9 +138,13 @@ def score(world: OneTest, outcome: tuple[Diagnosis, float]) -> dict[str, Any]:
     told, window = found.probabilities, found.found.posterior
     if told is None or window is None:
         raise ValueError("a diagnosis without probabilities")
-    missing = [t for t in world.truths if t.sigmas >= _LEAST_SEEN]
+    if found.verdict == Verdict.DATA_FAULT:
+        raise DataError(f"no statement on physics: {found.sentence}")
+    missing = [t for t in world.truths if t.sigmas >= _LEAST_SIGMAS]
     there, names = {_family(t) for t in missing}, {t.name for t in missing}
-    noise = {f"{term.triad} {term.kind}" for term in seen_noise(window, noise_terms(world.told["coloured"]))}
+    noise = {
+        f"{term.triad} {term.kind}" for term in seen_noise(window.board.as_stated, noise_terms(world.told["coloured"]))
+    }
     p_family = {(f.family, f.sensor): f.probability for f in told.families}
     return {
         **world.told,

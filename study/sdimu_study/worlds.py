@@ -219,7 +219,7 @@ def hideable_names() -> frozenset[str]:
 def with_effects(
     simulated: Callable[[tuple[str, ...]], tuple[PreparedTest, ImuTruth]],
     model: Model,
-    draws: Sequence[Callable[[Fit], Truth]],
+    draws: Sequence[Callable[[Fit], Truth | None]],
     told: Mapping[str, Any],
     clean: Callable[[], tuple[PreparedTest, ImuTruth]] | None = None,
 ) -> OneTest:
@@ -231,7 +231,8 @@ def with_effects(
         Of the effects as the simulator takes them.
     model : Model
     draws : sequence of callable
-        One an effect, called with the fit of the clean test; a parameter that is drawn twice counts once.
+        One an effect, called with the fit of the clean test; a parameter that is drawn twice counts once, and None is
+        no effect.
     told : mapping
         For the row.
     clean : callable, optional
@@ -242,7 +243,8 @@ def with_effects(
         fit = solve((clean() if clean else simulated(()))[0], model)
         for draw in draws:
             drawn = draw(fit)
-            truths.setdefault(drawn.name, drawn)
+            if drawn is not None:
+                truths.setdefault(drawn.name, drawn)
     test, sensor = simulated(tuple(t.text for t in truths.values()))
     return OneTest(test, model, sensor, tuple(truths.values()), told)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.noise_term import TRIADS
-from sdimu_calibration.core.posterior.noise_models import ODDS, usual_sizes
+from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import MARKOV_S, MARKOV_SPREAD, ODDS, usual_sizes
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_sim.core.coloured import KINDS, parse_noise
-from sdimu_sim.core.hidden import parse_effects
+from sdimu_sim.core.hidden import one_sided, parse_effects
 from sdimu_study.believed import BelievedEffects, believed_count, believed_noise
 from sdimu_study.worlds import simulated_test
 
@@ -32,7 +32,7 @@ def test_as_many_effects_are_drawn_as_the_prior_believes():
 def test_each_kind_of_noise_is_as_frequent_and_as_large_as_the_prior_believes():
     imu, rng = load_imu("mems_industrial"), np.random.default_rng(2)
     usual = usual_sizes(imu)
-    drawn = [[parse_noise(text) for text in believed_noise(imu, rng)] for _ in range(WORLDS)]
+    drawn = [[parse_noise(text) for text in believed_noise(imu, 1e9, rng)] for _ in range(WORLDS)]
     kinds = [Counter(key.triad for key in one) for one in drawn]
     assert max(max(one.values(), default=0) for one in kinds) == 2
     for triad in TRIADS:
@@ -53,6 +53,11 @@ def test_each_kind_of_noise_is_as_frequent_and_as_large_as_the_prior_believes():
             ]
             assert abs(np.mean(off)) < 4.0 / np.sqrt(len(off))
             assert abs(np.std(off) - 1.0) < 4.0 / np.sqrt(2.0 * len(off))
+    late = [np.log(key.tau / MARKOV_S) / MARKOV_SPREAD for one in drawn for key in one if key.kind == "markov"]
+    assert abs(np.mean(late)) < 4.0 / np.sqrt(len(late))
+    assert abs(np.std(late) - 1.0) < 4.0 / np.sqrt(2.0 * len(late))
+    short = [parse_noise(text) for _ in range(500) for text in believed_noise(imu, 600.0, rng)]
+    assert 100.0 < max(key.tau for key in short) <= 200.0
 
 
 @pytest.fixture(scope="module")
@@ -62,23 +67,46 @@ def fit():
 
 
 def test_effects_are_drawn_of_the_prior_and_the_simulator_reads_them(fit):
-    rng = np.random.default_rng(3)
-    of_size, worlds = [], 150
-    draw = BelievedEffects(rng, (), {"gyro_lost_data"})
+    rng, left_out = np.random.default_rng(3), "gyro_scale_asymmetry"
+    draw, drawn, of_size, families, worlds = BelievedEffects(rng, (), {left_out}), [], [], Counter(), 400
     for _ in range(worlds):
-        draw._drawn.clear()
-        drawn = [draw(fit) for _ in range(3)]
-        board = draw._board
-        sizes = {c.label: s for c, s in zip(map(board.evidence.candidate, board.use), board.size, strict=True)}
-        assert len(set(draw._drawn)) == 3
-        assert np.isfinite(board.prior.log_of(draw._drawn)), "a model that the search may find"
-        assert "gyro_lost_data" not in {one.family for one in drawn}
-        for one in drawn:
-            parse_effects([one.text])
-            label = one.text.rpartition("=")[0]
-            of_size.append(abs(one.value) / sizes[label])
-            assert one.sigmas > 0.0
-    # Of three widths, the usual one with .74: a normal size of it is below 1 in .68 of them.
+        draw._places.clear()
+        drawn += [draw(fit) for _ in range(3)]
+        (board, sigma), places = draw._prepared, draw._places
+        assert len(set(places)) == 3
+        assert np.isfinite(board.prior.log_of(places)), "a model that the search may find"
+        families[board.evidence.candidate(int(board.use[places[0]])).family] += 1
+    candidates = [board.evidence.candidate(int(column)) for column in board.use]
+    size = {c.label: s for c, s in zip(candidates, board.size, strict=True)}
+    one_sigma = {c.label: sigma[int(column)] for c, column in zip(candidates, board.use, strict=True)}
+    hidden = [one for one in drawn if one is not None]
+    assert 0.6 < len(hidden) / len(drawn) < 0.99
+    assert left_out not in {one.family for one in hidden}
+    for one in hidden:
+        parse_effects([one.text])
+        label = one.text.rpartition("=")[0]
+        of_size.append(one.value / size[label])
+        assert one.sigmas == pytest.approx(abs(one.value) / one_sigma[label])
+    # Families have the shares of the prior, that which is left out as well.
+    share = Counter()
+    for candidate, own in zip(candidates, np.exp(board.prior.log_share), strict=True):
+        share[candidate.family] += own
+    assert families[left_out] > 0
+    for family, expected in share.items():
+        assert abs(families[family] - worlds * expected) < 4.5 * np.sqrt(worlds * expected) + 1.0, family
+    # Of three widths, the usual one with .74: a normal size of it is below 1 in .68 of them. Signs are as often either.
     within = 0.74 * 0.683 + 0.24 * 0.159 + 0.02 * 0.016
     count = len(of_size)
-    assert abs(np.mean(np.array(of_size) < 1.0) - within) < 4.0 * np.sqrt(within * (1.0 - within) / count)
+    assert abs(np.mean(np.abs(of_size) < 1.0) - within) < 4.0 * np.sqrt(within * (1.0 - within) / count)
+    both = [v for v, one in zip(of_size, hidden, strict=True) if not one_sided(one.name)]
+    assert abs(np.mean(np.array(both) > 0.0) - 0.5) < 0.1
+
+
+def test_sigmas_count_the_noise(fit):
+    walk = (NoiseTerm("gyro", "random_walk", size=np.deg2rad(0.1) / 3600.0 / 60.0),)
+    still, noisy = (BelievedEffects(np.random.default_rng(4), noise) for noise in ((), walk))
+    pairs = [(one, other) for one, other in ((still(fit), noisy(fit)) for _ in range(12)) if one is not None]
+    assert len(pairs) > 3
+    assert all(one.text == other.text for one, other in pairs)
+    assert all(other.sigmas <= one.sigmas * (1.0 + 1e-9) for one, other in pairs)
+    assert min(other.sigmas / one.sigmas for one, other in pairs) < 0.5

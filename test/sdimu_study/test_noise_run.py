@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
 from sdimu_calibration.storage.files.config import load_imu, load_model
@@ -48,16 +49,23 @@ def test_the_page_counts_what_was_hidden_apart_from_what_is_not_there():
 def test_noise_is_seen_where_it_gains_likelihood_beside_the_other_terms():
     imu = load_imu("dtg")
     test, sensor = simulated_test("dtg", imu, "kim18_10_min", Site(0.6, 0.0), 5, ())
-    found = diagnosed(OneTest(test, load_model("baseline"), sensor)).found.posterior
-    unit = np.deg2rad(1.0) / 3600.0
-    strong, weak = (NoiseTerm("gyro", "flicker", size=size * unit) for size in (1.0, 1e-5))
-    slower, other = NoiseTerm("gyro", "markov", 900.0, 0.1 * unit), NoiseTerm("accel", "shift", size=1e-9)
-    assert seen_noise(found, []) == []
-    assert seen_noise(found, [strong, weak, other]) == [strong]
-    # What a strong term of the same triad covers is not seen; alone it is.
-    faint = replace(slower, size=0.05 * unit)
-    assert seen_noise(found, [faint]) == [faint]
-    assert seen_noise(found, [strong, faint]) == [strong]
+    board = diagnosed(OneTest(test, load_model("baseline"), sensor)).found.posterior.board.as_stated
+    strong = NoiseTerm("gyro", "flicker", size=np.deg2rad(1.0) / 3600.0)
+    slower = NoiseTerm("gyro", "markov", 150.0, 0.05 * strong.size)
+    assert seen_noise(board, []) == []
+    assert seen_noise(board, [slower]) == [slower]
+    # What a strong term of the same triad covers is not seen, in whatever order they stand.
+    assert seen_noise(board, [strong, slower]) == seen_noise(board, [slower, strong]) == [strong]
+    # One of two is seen where they gain enough together.
+    least = min(
+        (replace(strong, size=strong.size * 1.05**-k) for k in range(200)),
+        key=lambda term: (not seen_noise(board, [term]), term.size),
+    )
+    assert len(seen_noise(board, [least, replace(slower, size=least.size)])) == 1
+    # From a gain of .5 on, as the search asks for: the gain is a monotonic function of the size.
+    J, cut = board.joint.on_wander(*board.parameters(())).J, board.wander.cut
+    shown = np.linalg.eigvalsh(root_of([least], cut).T @ J @ root_of([least], cut)).clip(0.0)
+    assert 0.5 <= 0.5 * np.sum(shown - np.log(1.0 + shown)) < 0.6
 
 
 @pytest.mark.slow

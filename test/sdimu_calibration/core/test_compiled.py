@@ -162,6 +162,10 @@ def test_a_function_called_with_several_constants_is_compiled_once(tmp_path, mon
     names = runpy.run_path(str(script))
     assert names["both"](2.0) == 2.0 * 3 + 2.0 * 5
     assert [[str(kind) for kind in kinds] for kinds in names["times"].overloads] == [["float64", "int64"]]
+    how = names["times"].targetoptions
+    assert how["nopython"]
+    assert how["nogil"], "loops run side by side in threads"
+    assert how["error_model"] == "numpy", "a division by zero is no exception"
 
 
 def test_a_copy_is_compiled_once_most_kernels_are_kept(tmp_path, monkeypatch):

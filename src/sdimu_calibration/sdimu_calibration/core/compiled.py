@@ -37,7 +37,7 @@ _MOST_LOOPS = 50
 """Number of compiled loops (1) from which a run hardly waits for others: a test, its fit and its diagnosis need 70."""
 
 _HOW = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
-"""How numba compiles: without the global lock, without a form for callers in C; a division by zero gives inf or NaN."""
+"""How numba compiles: without the global lock, without a wrapper for C; a division by zero gives inf or NaN."""
 
 _IMPORT = re.compile(rb"^from ((?:sdimu_|rate_table_sim)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 """An import from one of the three packages at the start of a line: module, names."""
@@ -141,7 +141,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
 
 class _Function(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function. Numba alone compiles it anew for each constant that another compiled function gives it."""
+    """Compiled once for all constants that other compiled functions pass to it; numba compiles once for each."""
 
     def get_call_template(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
         return super().get_call_template(
@@ -249,7 +249,9 @@ def _digest(file: Path) -> str:
 def compiled(function: F) -> F:
     """Compile a loop with numba, cached on disk, without the global lock.
 
-    Not `fastmath`: NaN must stay NaN, and the same data must give the same digits in every process.
+    Not `fastmath`: NaN must stay NaN, and the same data must give the same digits in every process. The value of a
+    constant argument is not known while a function is compiled: it cannot index a tuple of mixed types or choose an
+    axis.
 
     Numba's cache notices a change of the function's own file only, while functions of other files are compiled into it.
     So the cache's folder is named by the sources of the file and of every file with compiled functions that it imports

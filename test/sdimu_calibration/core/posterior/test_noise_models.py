@@ -314,3 +314,24 @@ def test_noise_with_other_drawn_terms_in_the_place_of_the_likeliests_is_found_fa
     # In one of the six it is more than 30 behind.
     assert len(behind) >= 4
     assert min(behind) > 6.0
+
+
+def test_other_kinds_are_looked_for_once_beside_the_same_terms_and_in_a_brief_search_not_at_all(
+    cut, usual, monkeypatch
+):
+    looked, without = [], _Search.without
+
+    def noted(self, best, place):
+        found = without(self, best, place)
+        looked.append((self, best.noise.terms[place].triad, found.noise.kinds))
+        return found
+
+    monkeypatch.setattr(_Search, "without", noted)
+    information = shifted_once(np.random.default_rng(0), cut, usual.centre["gyro", STOP])
+    whole = explored(information, cut, usual)
+    # Beside two kinds of noise, and beside a third one that came in the place of one of these.
+    assert len(looked) == len(set(looked)) == 3
+    looked.clear()
+    brief = explored(information, cut, usual, brief=True)
+    assert not looked
+    assert 0.0 < brief[0][0] < whole[0][0]

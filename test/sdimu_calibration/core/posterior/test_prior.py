@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, prior_of
 
@@ -22,6 +23,8 @@ def test_a_delay_is_twice_as_usual_as_what_looks_the_same_and_stands_in_few_data
     share = np.exp(prior_of(candidates).log_share)
     assert share.sum() == pytest.approx(1.0)
     assert share / share[1] == pytest.approx([2.0, 1.0, 1.0, 0.5])
+    for delay in ("gyro_delay", "accel_delay", "accel_triad_delay"):
+        assert usual(delay) == 2.0
 
 
 def test_what_acts_on_one_axis_is_likelier_beside_what_acts_on_another(candidates):

@@ -228,13 +228,13 @@ class SetBoard(Board[SetEvidence]):
         return self._likelihood(self._chosen(noise), columns, weight) - self._likelihood(self._white, columns, weight)
 
     def noises(
-        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf
+        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf, brief: bool = False
     ) -> list[tuple[float, NoiseModel]]:
         """Noises that are probable beside a set of effects, each with the log posterior of both (1).
 
         That of each recording is chosen in turn until all stand; others are one change away from these.
         """
-        del tried, rival
+        del tried, rival, brief
         alone = self.data(NoiseModel())[1].at(members).of_any_sign
         if members not in self._found:
             self._found[members] = self._tried(*self.parameters(members))

@@ -259,12 +259,12 @@ class Board(Generic[E]):
         return known, np.concatenate([self.evidence.weight, own])
 
     def noises(
-        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf
+        self, members: Members, tried: Sequence[NoiseTerm] | None = None, rival: float = -np.inf, brief: bool = False
     ) -> list[tuple[float, NoiseModel]]:
         """Noises that are probable beside a set of effects, each with the log posterior of both (1).
 
         Kinds that are `tried` alone are looked for; all without any. `rival` is the log posterior of the best model
-        known.
+        known. `brief` is that of `noise_search.explored`.
         """
         if self.joint is None or self.wander is None:
             return [(self.data(NoiseModel())[1].at(members).score, NoiseModel())]
@@ -272,7 +272,8 @@ class Board(Generic[E]):
         information = self.joint.on_wander(known, weight)
         # A size that has the wrong sign in white noise may have the right one in another.
         alone = self.data(NoiseModel())[1].at(members).of_any_sign
-        found = explored(information, self.wander.cut, usual_sizes(self.evidence.imu), tried, max(rival - alone, 0.0))
+        usual, behind = usual_sizes(self.evidence.imu), max(rival - alone, 0.0)
+        found = explored(information, self.wander.cut, usual, tried, behind, brief)
         return [(alone + score, noise) for score, noise in found]
 
     def instead_of(self, likeliest: NoiseModel, others: Sequence[NoiseModel]) -> Sequence[NoiseModel]:

@@ -66,6 +66,7 @@ class _Search:
         self.information, self.cut, self.usual = information, cut, usual
         self.tried = every_kind(cut) if tried is None else list(tried)
         self.seen: dict[frozenset[Identity], _Found] = {}
+        self._looked_beside: set[tuple[str, frozenset[Identity]]] = set()
 
     def keep(self, found: _Found) -> _Found:
         """Remember a noise."""
@@ -137,9 +138,13 @@ class _Search:
         """Put each other kind of noise in the place of a term.
 
         Nothing in the other triad takes the place of a term: `crossed` puts the triads together. Another term of the
-        triad has another size beside it.
+        triad has another size beside it. Beside the same other terms this is done once, whichever term it was for.
         """
         triad = best.noise.terms[place].triad
+        beside = triad, _kinds(_without(best.noise, place).terms)
+        if beside in self._looked_beside:
+            return
+        self._looked_beside.add(beside)
         options = self.one_more(self.without(best, place), (triad,))
         for two in _first([one for one in options if len(_of_triad(one.noise, triad)) > 1], best.score - _BEHIND):
             self.settled(two.noise, (triad,))
@@ -309,6 +314,7 @@ def explored(
     usual: Sizes,
     tried: Sequence[NoiseTerm] | None = None,
     rival: float = 0.0,
+    brief: bool = False,
 ) -> list[tuple[float, NoiseModel]]:
     """Find the noises that are probable beside one set of effects.
 
@@ -320,6 +326,8 @@ def explored(
         Kinds and time constants to look for; all of them without.
     rival : float
         Log posterior (1), over white noise, that effects reach in its place: noise that stays far behind is given up.
+    brief : bool
+        Terms are added one by one alone: no other ones are looked for in their place.
 
     Returns
     -------
@@ -341,10 +349,10 @@ def explored(
             if len(option.noise.terms) < 2
             else max(search.settled(option.noise), option, key=lambda found: found.score)
         )
-    if best.noise.terms:
+    if best.noise.terms and not brief:
         search.paired(best)
         best = max(best, search.best(), key=lambda found: found.score)
-    for _ in range(_MOST_STEPS):
+    for _ in range(0 if brief else _MOST_STEPS):
         for place in range(len(best.noise.terms)) if len(best.noise.terms) > 1 else ():
             search.exchanged(best, place)
         if not search.best().score > best.score + _SETTLED:
@@ -358,4 +366,4 @@ def explored(
     if any(noise.wanders_alone for _, noise in near):
         return near
     wandering = [term for term in search.tried if term.kind not in DRAWN]
-    return [*near, *explored(information, cut, usual, wandering)[:1]]
+    return [*near, *explored(information, cut, usual, wandering, brief=brief)[:1]]
