@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 
 import sdimu_calibration as sdimu
+from sdimu_calibration.api import diagnosis as diagnosis_in_python
 from sdimu_calibration.api.advice_in_python import IN_PYTHON_OF_A_SET, in_python
 from sdimu_calibration.api.diagnosis import FitDiagnosis
 from sdimu_calibration.api.fit import CalibrationFit
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.plan_search import NextTurn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import find_config, load_plan
@@ -89,12 +91,15 @@ def test_where_no_plan_was_seen_the_user_states_it(diagnosis):
     assert call.startswith('found.turns("a", "b", plan="PLAN") (PLAN: ')
 
 
-@pytest.mark.parametrize("stated", [Path("kim18.yaml"), str(find_config("plan", "kim18")), load_plan("kim18")])
+@pytest.mark.parametrize("stated", ["kim18", Path("kim18.yaml"), str(find_config("plan", "kim18")), load_plan("kim18")])
 def test_turns_take_a_plan_as_path_name_or_itself(found, stated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "kim18.yaml").write_bytes(find_config("plan", "kim18").read_bytes())
-    named = found.turns("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y", plan="kim18")
-    assert found.turns("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y", plan=stated) == named
+    ranked = (NextTurn(load_plan("kim18").turns[:1], 2.0, 0.0, 5.0),)
+    begun = []
+    monkeypatch.setattr(diagnosis_in_python, "next_turn", lambda start, *_: begun.append(start) or ranked)
+    assert found.turns("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y", plan=stated) == ranked
+    assert begun == [load_plan("kim18")]
 
 
 @pytest.mark.parametrize(

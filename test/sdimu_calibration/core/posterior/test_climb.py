@@ -53,7 +53,7 @@ class Board:
         """Log posterior of the effect over that of none."""
         return best_from(self.data(noise)[1], ())[0]
 
-    def noises(self, members, tried=None, _rival=0.0):
+    def noises(self, members, tried=None, _rival=0.0, brief=False):  # noqa: ARG002
         self.asked.append(members)
         if not members:
             return self.beside_none
@@ -143,7 +143,7 @@ class Drifting(Board):
     def instead_of(self, _likeliest, _others):
         return []
 
-    def noises(self, members, _tried=None, _rival=0.0):
+    def noises(self, members, _tried=None, _rival=0.0, brief=False):  # noqa: ARG002
         offset, noise = (70.0, WALK) if [k for k, _ in members] == [2] else (0.0, WHITE)
         return [(offset + self.data(noise)[1].at(members).score, noise)]
 
