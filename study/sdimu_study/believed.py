@@ -29,7 +29,7 @@ from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 from sdimu_sim.core.coloured import KINDS
 from sdimu_sim.core.hidden import effect_names, one_sided, size_unit
-from sdimu_study.worlds import Truth, option_of
+from sdimu_study.worlds import TESTABLE, Truth, option_of
 
 _MOST_TERMS = 2
 """Number of noise terms of a triad at most (1), as a diagnosis looks for them."""
@@ -74,11 +74,14 @@ class BelievedEffects:
 
     def __init__(self, rng: np.random.Generator, noise: Sequence[NoiseTerm], left_out: Collection[str] = ()) -> None:
         self._rng, self._noise, self._left_out = rng, noise, left_out
-        self._prepared: tuple[Board[LinearEvidence], Floats] | None = None
+        self._prepared: tuple[Board[LinearEvidence], Floats, Floats] | None = None
         self._places: list[int] = []
 
     def __call__(self, fit: Fit) -> Truth | None:
-        """Draw the next effect; None where it is one that is not hidden, or that the simulator does not have.
+        """Draw the next effect; None where it is one that is not hidden.
+
+        Not hidden are families that are left out, what the simulator does not have, and what the priors of the
+        coefficients alone tell from these: a large one is found as a coefficient.
 
         Parameters
         ----------
@@ -86,7 +89,7 @@ class BelievedEffects:
             Of the clean test.
         """
         self._prepared = self._prepared or _prepared(fit, self._noise)
-        (board, sigma), rng = self._prepared, self._rng
+        (board, sigma, apart), rng = self._prepared, self._rng
         odds = board.prior.log_more(sorted(self._places))
         share = np.exp(odds - odds.max())
         place = int(rng.choice(len(share), p=share / share.sum()))
@@ -96,14 +99,14 @@ class BelievedEffects:
         column = int(board.use[place])
         candidate = board.evidence.candidate(column)
         name = candidate.parameter.name
-        if name not in effect_names() or candidate.family in self._left_out:
+        if name not in effect_names() or candidate.family in self._left_out or apart[column] < TESTABLE:
             return None
         value = abs(value) if one_sided(name) or candidate.effect.positive else value
         text = sized(candidate.label, value, size_unit(name))
         return Truth(name, candidate.family, option_of(candidate.label), value, abs(value) / float(sigma[column]), text)
 
 
-def _prepared(fit: Fit, noise: Sequence[NoiseTerm]) -> tuple[Board[LinearEvidence], Floats]:
+def _prepared(fit: Fit, noise: Sequence[NoiseTerm]) -> tuple[Board[LinearEvidence], Floats, Floats]:
     """Take all that may be in a model of the clean test.
 
     Returns
@@ -112,10 +115,14 @@ def _prepared(fit: Fit, noise: Sequence[NoiseTerm]) -> tuple[Board[LinearEvidenc
         With the candidates of a diagnosis.
     sigma : ndarray, shape (columns,)
         Of each column of its evidence in the noise (SI).
+    apart : ndarray, shape (columns,)
+        Share of the signature of each that coefficients without priors leave (1).
     """
     ground = fresh_ground(Request(fit, (), FALSE_ALARM), fit, (), own=False)
     noisy = ground.evidence
     if noise:
         noisy = noisy.with_noise(wander_in(fit.evidence(), noise).modes(noise).columns)
     sigma = scan(noisy.information, noisy.model, noisy.weight).sigma
-    return Board(ground.evidence, ground.allowed, frozenset(), None), sigma
+    one = ground.evidence
+    apart = scan(one.information, one.model, 1e-9 * one.weight).retention
+    return Board(one, ground.allowed, frozenset(), None), sigma, apart

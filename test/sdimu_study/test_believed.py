@@ -72,12 +72,14 @@ def test_effects_are_drawn_of_the_prior_and_the_simulator_reads_them(fit):
     for _ in range(worlds):
         draw._places.clear()
         drawn += [draw(fit) for _ in range(3)]
-        (board, sigma), places = draw._prepared, draw._places
+        (board, sigma, apart), places = draw._prepared, draw._places
         assert len(set(places)) == 3
         assert np.isfinite(board.prior.log_of(places)), "a model that the search may find"
         families[board.evidence.candidate(int(board.use[places[0]])).family] += 1
     candidates = [board.evidence.candidate(int(column)) for column in board.use]
     size = {c.label: s for c, s in zip(candidates, board.size, strict=True)}
+    left = {c.label: apart[int(column)] for c, column in zip(candidates, board.use, strict=True)}
+    assert min(left.values()) < 0.05, "the prior of a coefficient alone tells some"
     one_sigma = {c.label: sigma[int(column)] for c, column in zip(candidates, board.use, strict=True)}
     hidden = [one for one in drawn if one is not None]
     assert 0.6 < len(hidden) / len(drawn) < 0.99
@@ -87,6 +89,7 @@ def test_effects_are_drawn_of_the_prior_and_the_simulator_reads_them(fit):
         label = one.text.rpartition("=")[0]
         of_size.append(one.value / size[label])
         assert one.sigmas == pytest.approx(abs(one.value) / one_sigma[label])
+        assert left[label] >= 0.05
     # Families have the shares of the prior, that which is left out as well.
     share = Counter()
     for candidate, own in zip(candidates, np.exp(board.prior.log_share), strict=True):
