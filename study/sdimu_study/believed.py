@@ -1,10 +1,10 @@
 """Worlds as the diagnosis believes them: effects and noise drawn from its prior, made by the simulator.
 
 In such worlds probabilities must come true. If they do, probabilities that do not come true in other worlds are a
-matter of the prior; if they do not, of the search or of the likelihood. Effects that the simulator does not have, a
-fifth of the prior, are drawn and left out; that effects of one cause on several axes are likelier together counts in
-which ones are drawn, and not in how many. Source: S. Talts et al., "Validating Bayesian inference algorithms with
-simulation-based calibration", arXiv 1804.06788 (2018).
+matter of the prior; if they do not, of the search or of the likelihood. What is not hidden (`BelievedEffects`), one to
+three hundredths of the prior, is drawn and left out. That effects of one cause on several axes are likelier together
+counts in which ones are drawn, and not in how many. Source: S. Talts et al., "Validating Bayesian inference algorithms
+with simulation-based calibration", arXiv 1804.06788 (2018).
 """
 
 from __future__ import annotations
@@ -24,15 +24,13 @@ from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import MARKOV, RANDOM_WALK, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_models import MARKOV_S, MARKOV_SPREAD, ODDS, usual_sizes
+from sdimu_calibration.core.posterior.noise_search import MOST_TERMS
 from sdimu_calibration.core.posterior.prior import MEAN_NUMBER, WIDTH_SHARES, WIDTHS
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si
 from sdimu_sim.core.coloured import KINDS
 from sdimu_sim.core.hidden import effect_names, one_sided, size_unit
 from sdimu_study.worlds import TESTABLE, Truth, option_of
-
-_MOST_TERMS = 2
-"""Number of noise terms of a triad at most (1), as a diagnosis looks for them."""
 
 
 def believed_count(rng: np.random.Generator) -> int:
@@ -48,7 +46,7 @@ def believed_noise(imu: ImuSpecification, duration_s: float, rng: np.random.Gene
     usual, out = usual_sizes(imu), []
     for triad, unit in zip(TRIADS, ("deg/h", "ug"), strict=True):
         kinds: list[str] = list(KINDS)
-        while len(kinds) > _MOST_TERMS:
+        while len(kinds) > MOST_TERMS:
             kinds = [kind for kind in KINDS if rng.random() < ODDS[kind] / (1.0 + ODDS[kind])]
         for kind in kinds:
             size = usual.centre[triad, kind] * float(np.exp(usual.spread[triad, kind] * rng.standard_normal()))

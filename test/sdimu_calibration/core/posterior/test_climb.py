@@ -37,7 +37,7 @@ class Board:
         self.levels = {WHITE: (0.0, 0.0), WIDE: (900.0, 4.0), LIKE_AN_EFFECT: (932.0, 0.0), NARROW: (890.0, 10.0)}
         self.levels[WALK] = (905.0, 10.0)
         self.beside_none = [(932.0, LIKE_AN_EFFECT), (900.0, WIDE)]
-        self.walk, self.asked, self.instead = walk, [], []
+        self.walk, self.asked, self.instead, self.of_known = walk, [], [], []
 
     def data(self, noise):
         offset, pull = self.levels[noise]
@@ -53,8 +53,11 @@ class Board:
         """Log posterior of the effect over that of none."""
         return best_from(self.data(noise)[1], ())[0]
 
-    def noises(self, members, tried=None, _rival=0.0, brief=False):  # noqa: ARG002
+    def noises(self, members, tried=None, _rival=0.0, brief=False):
         self.asked.append(members)
+        assert not (brief and tried is None), "all kinds are looked for with others in the place of what is found"
+        if tried is not None:
+            self.of_known.append((members, brief))
         if not members:
             return self.beside_none
         found = [(self.levels[NARROW][0] + self.gain(NARROW), NARROW)]
@@ -92,6 +95,8 @@ def test_beside_what_turns_out_best_every_kind_of_noise_was_looked_for():
     assert noises[0] == WALK
     assert [k for k, _ in ends[0]] == [0]
     assert WALK in [noise for _, noise in beside]
+    # The first time as a rival, and whole; then briefly, before all kinds are looked for.
+    assert [brief for members, brief in board.of_known if members == ends[0]] == [False, True]
 
 
 def test_an_effect_that_is_as_likely_as_noise_is_in_the_window_with_its_noise():

@@ -131,7 +131,7 @@ def _noises_beside(
         Whether all kinds that are `tried` were looked for.
     """
     if tried is None and known:
-        # Whether all kinds must be looked for shows without others in the place of what is found.
+        # A brief search tells noise that is far behind.
         found = board.noises(members, known, best, brief=not rival)
         if rival or max((score for score, _ in found), default=-np.inf) < best - _FAR:
             return found, False

@@ -35,7 +35,7 @@ _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
-_MOST_TERMS = 2
+MOST_TERMS = 2
 """Number of terms of a triad at most: a test of an hour tells no more apart."""
 _SMALLER = 0.5
 """Size of noise beside an effect over that found beside none (1): the effect made most of it."""
@@ -81,7 +81,7 @@ class _Search:
         room = []
         for term in self.tried:
             own = _of_triad(NoiseModel(terms), term.triad)
-            if term.triad in triads and len(own) < _MOST_TERMS and not _is_in(term, own):
+            if term.triad in triads and len(own) < MOST_TERMS and not _is_in(term, own):
                 room.append(term)
         given = {name: self.information.of_triad(name, terms, self.cut) for name in {t.triad for t in room}}
         alike: dict[tuple[str, str, float], list[NoiseTerm]] = {}
@@ -338,7 +338,7 @@ def explored(
     """
     search = _Search(information, cut, usual, tried)
     best = search.keep(_Found(NoiseModel(), 0.0))
-    for share in chain(_SHARES, repeat(1.0, _MOST_TERMS * len(TRIADS))):
+    for share in chain(_SHARES, repeat(1.0, MOST_TERMS * len(TRIADS))):
         option = max(search.one_more(best), key=lambda found: found.score, default=best)
         if not option.score > best.score + _SETTLED:
             break
