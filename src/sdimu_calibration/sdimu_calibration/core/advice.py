@@ -70,15 +70,20 @@ class Kind(StrEnum):
     """Likewise."""
 
     # What to do to tell an effect from what looks the same: minutes of the turns and stops, where it has some.
-    TURN_FASTER = auto()
-    TURN_BACK = auto()
     STAY_AND_RETURN = auto()
     """Minutes at the last stop; minutes of the first one again."""
-    REST_ON_DIAGONAL = auto()
     REPEAT_TURN = auto()
     COME_BACK = auto()
     TURN_BOTH_WAYS = auto()
     REST_BETWEEN = auto()
+
+    # What all data of a unit leave open.
+    NO_PLAN_TELLS = auto()
+    """Label, and what no plan tells it from."""
+    RECORD_ONCE_MORE = auto()
+    """Label; what looks the same; turns in words."""
+    NO_TURN_TELLS = auto()
+    """Label; what looks the same; significance of the best turn, and that which tells (sigma)."""
 
     # About sets.
     REVERSE_AND_ADD = auto()
@@ -92,12 +97,6 @@ class Kind(StrEnum):
     """Recording; by what all its accelerometers' scale factors differ, with its sigma and unit."""
     RECORD_A_THIRD = auto()
     """Label of the coefficient that changed; the two recordings."""
-    NO_PLAN_TELLS = auto()
-    """Label, and what no plan tells it from."""
-    RECORD_ONCE_MORE = auto()
-    """Label; what looks the same; turns in words."""
-    NO_TURN_TELLS = auto()
-    """Label; what looks the same; significance of the best turn, and that which tells (sigma)."""
     ONE_BY_ONE = auto()
 
     # About a fit.

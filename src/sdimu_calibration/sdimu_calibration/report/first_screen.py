@@ -15,7 +15,7 @@ from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis_judged, noise_learned
+from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.note import without_advice
@@ -176,7 +176,8 @@ def of_fit(calibration: Calibration, spell: Spell | None = None) -> FirstScreen:
 
 
 def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
-    error, squared, learned = held_out(calibration), nis_judged(calibration), noise_learned(calibration)
+    learned = noise_learned(calibration) and not _stands_for_an_effect(calibration)
+    error, squared = held_out(calibration), nis_judged(calibration) if learned else nis(calibration)
     left_out = "recordings" if calibration.of_set else "rests" if is_handheld(calibration) else "stops"
     out = [_in_noise(held_out_judged(calibration))] if learned else []
     if np.isfinite(error):
@@ -186,6 +187,12 @@ def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
         noise = "noise that was learned" if learned else "noise"
         out.append((f"{squared:.3f}", f"NIS: mean squared innovation over what the {noise} explains; 1 is right"))
     return tuple(out)
+
+
+def _stands_for_an_effect(calibration: Calibration) -> bool:
+    """Whether noise was learned in the place of what is missing: in it everything is right, and nothing is."""
+    in_noise = (held_out_judged(calibration), nis_judged(calibration))
+    return bool(calibration.misfits) and noise_learned(calibration) and not max(in_noise) > MISFIT
 
 
 def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.family import BIAS_DRIFT
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
@@ -65,7 +66,7 @@ def family_in_words(family: FamilyShare) -> str:
     sensor = family.sensor.replace("_", " ")
     if family.family == "own":
         return f"An equation that the catalogue lacks, {sensor}"
-    if family.family.endswith("_bias_drift"):
+    if family.family.endswith(BIAS_DRIFT):
         return f"Slow change of the bias, {sensor}"
     words = title_of(family.members[0].label.partition("(")[0]) if family.members else family.family
     return f"{words[:1].upper()}{words[1:]}{f', {sensor}' if sensor else ''}"

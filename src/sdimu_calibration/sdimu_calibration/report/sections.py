@@ -227,6 +227,9 @@ def _own_share(one: Found) -> str:
     return percents_of(one.may_be).get(one.candidate.coefficient, alone)
 
 
+_TELLS_APART = {Kind.RECORD_ONCE_MORE, Kind.NO_TURN_TELLS, Kind.NO_PLAN_TELLS, Kind.TELL_APART, Kind.RANK_TURNS}
+
+
 def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
     """Return what each found effect would be confused with, what hangs on it, and what would tell; empty if nothing."""
     rows = []
@@ -259,7 +262,7 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         )
     if not rows:
         return ""
-    told = [one for one in summary.advice if one.kind in {Kind.TELL_APART, Kind.RANK_TURNS}]
+    told = [one for one in summary.advice if one.kind in _TELLS_APART]
     return section(
         "What it would be confused with",
         '<div class="wide"><table class="words"><thead><tr><th class="text" scope="col">found</th>'

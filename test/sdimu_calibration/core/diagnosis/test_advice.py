@@ -18,7 +18,7 @@ from sdimu_calibration.core.diagnosis.advice import (
     add,
     mend,
     others,
-    telling_turn,
+    telling_stay,
     together,
 )
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
@@ -81,7 +81,7 @@ def test_effects_of_a_file_can_be_added_as_the_advice_says(tmp_path):
 
 def test_what_is_to_be_done_for_several_finds_is_said_once():
     x, y, z = split(registry.get("accel_quadratic"))
-    turn, rest = Advice(Kind.TURN_FASTER, (4.6,)), Advice(Kind.REST_BETWEEN)
+    turn, rest = Advice(Kind.REPEAT_TURN, (4.6,)), Advice(Kind.REST_BETWEEN)
     asked = [(found(x, ["a"]), turn), (found(y, ["b", "c"]), turn), (found(z, ["d"]), rest)]
     assert [sentence(one) for one in together(asked)] == [
         f"To tell accel_quadratic_x from a, and accel_quadratic_y from b, c: {sentence(turn)}.",
@@ -132,16 +132,9 @@ def test_coefficients_at_stake_are_those_of_members_that_are_named():
     assert _in_sight(odd) == [equation]
 
 
-@pytest.mark.parametrize(("oblique", "kind"), [(0, Kind.REST_ON_DIAGONAL), (8, Kind.REPEAT_TURN)])
-def test_stops_on_the_diagonal_are_advised_where_the_plan_has_none(oblique, kind):
-    (candidate,) = split(resolve("accel_quadratic_z"))
-    turns = tuple(TurnSeen(k, k % 3, (-1.0) ** (k // 3), 0.1 * (1 + k // 3), 0.3) for k in range(6))
-    assert telling_turn(candidate.effect, PlanSeen(turns, oblique, 2.0)).kind == kind
-
-
 def test_the_minutes_of_a_stay_are_those_of_all_that_is_told():
     (candidate,) = split(resolve("gyro_bias_warm_up_x(tau=600 s)"))
-    what = telling_turn(candidate.effect, PlanSeen((TurnSeen(0, 0, 1.0, 0.1, 0.3),), True, 2.0))
+    what = telling_stay(candidate.effect, PlanSeen((TurnSeen(0, 0, 1.0, 0.1, 0.3),), True, 2.0))
     assert sentence(what) == "stay at the last stop for 20 min more, then repeat the first stop (23 min together)"
 
 

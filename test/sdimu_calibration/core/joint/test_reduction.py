@@ -57,3 +57,14 @@ def test_what_is_of_the_recording_alone_is_estimated_along(seed):
     kept = [0, 1, 2, 5]
     np.testing.assert_allclose(rows[:, :-1].T @ rows[:, :-1], given.J[np.ix_(kept, kept)], atol=1e-10)
     np.testing.assert_allclose(rows[:, :-1].T @ rows[:, -1], given.d[kept], atol=1e-10)
+
+
+def test_a_row_that_tells_nothing_beside_the_priors_is_left_out():
+    # Gravity and a common scale factor: one column but for 2e-6 of it, priors of a thousand sigma.
+    A, y, weight = np.array([[1.0, 1.0], [1e-6, -1e-6]]), np.array([5.0, 4.0]), np.array([1e-6, 1e-6])
+    rows, values = room._telling(A, y, weight)
+    np.testing.assert_array_equal(rows, A[:1])
+    np.testing.assert_array_equal(values, y[:1])
+    # With priors ten thousand times as wide it tells something, and so it may of a third parameter.
+    assert len(room._telling(A, y, weight * 1e-8)[1]) == 2
+    assert len(room._telling(np.column_stack([A, [0.0, 1e-6]]), y, weight)[1]) == 2

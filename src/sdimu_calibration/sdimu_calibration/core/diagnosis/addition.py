@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.advice import Advice
+from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.advice import NOT_BY_HAND, reason, telling_turn
+from sdimu_calibration.core.diagnosis.advice import NOT_BY_HAND, in_catalogue, reason, telling_stay
 from sdimu_calibration.core.diagnosis.found import DetectableSize
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
+from sdimu_calibration.core.effects.effect import Excitation
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.testable import TESTABLE
@@ -53,7 +55,7 @@ class Addition:
     alike: tuple[str, ...]
     """What the data cannot tell from its first parameter."""
     tells: Advice | None
-    """The turn or stop that would tell them apart; None where nothing looks the same."""
+    """What would tell them apart; None where nothing looks the same."""
     objections: tuple[str, ...]
     """What speaks against it, one line each."""
 
@@ -85,11 +87,20 @@ def addition(fit: Fit, evidence: LinearEvidence, columns: Sequence[int], allowed
     taken = "cannot be told from the coefficients of the model"
     against = [f"{evidence.names[k]} {taken}: {_why(evidence, k)}" for k in hidden]
     against += _against(labels, estimate[p:], sigma, evidence.prior[np.array(chosen) - p], raised, error)
-    effect = problem.candidate(chosen[0]).effect
-    tells = telling_turn(effect, plan_seen(evidence)) if alike and isinstance(evidence, NavigationEvidence) else None
+    tells = _telling(problem.candidate(chosen[0]), alike, evidence)
     return Addition(
         labels, np.array(chosen, dtype=np.int64), estimate[p:], sigma, error, raised[1], alike, tells, tuple(against)
     )
+
+
+def _telling(one: Candidate, alike: Sequence[str], evidence: LinearEvidence) -> Advice | None:
+    """Say what would tell a candidate from the first that looks the same: turns that are ranked, or a stay."""
+    if not alike or not isinstance(evidence, NavigationEvidence):
+        return None
+    lasting = Excitation.REPEATED_ATTITUDES not in one.effect.excitation
+    if lasting and all(map(in_catalogue, names := (one.label, alike[0]))):
+        return Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)
+    return telling_stay(one.effect, plan_seen(evidence))
 
 
 def objections(

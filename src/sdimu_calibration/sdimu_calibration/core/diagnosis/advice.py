@@ -1,7 +1,8 @@
 """What to do next, as data with minutes: about what was found, and about what this plan cannot show.
 
-The rules are those of observability on a rate table: an even function of the rate needs both senses of turn, its shape
-two rates, a product of forces stops between the axes, a change with time the same attitude twice.
+What is open is closed by the turn that the covariance says (`closing`); a change with time, which no plan foresees, by
+the same attitude twice. What the plan cannot show at all follows from observability on a rate table: an even function
+of the rate needs both senses of turn, its shape two rates, a product of forces stops between the axes.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.diagnosis.closing import Closing, closing_advice, next_recording
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
@@ -19,11 +21,13 @@ from sdimu_calibration.core.diagnosis.grades import NAMED, graded, other_coeffic
 from sdimu_calibration.core.diagnosis.measured_noise import is_off, of_other_grade
 from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen
 from sdimu_calibration.core.diagnosis.screen import Finding
+from sdimu_calibration.core.diagnosis.standing import standing
 from sdimu_calibration.core.effects import references, registry, selection
 from sdimu_calibration.core.effects.effect import Effect, Excitation
 from sdimu_calibration.core.evidence.consistency import Noise
 from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.noise_term import FOLLOWS
+from sdimu_calibration.core.plan_search import Question
 from sdimu_calibration.core.posterior.told import Probabilities
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.verdict import Verdict
@@ -145,21 +149,40 @@ def _about_found(d: Diagnosis, found: tuple[Found, ...], plan: PlanSeen) -> list
             out.append(Advice(Kind.CORRECT_LATITUDE, (one.value, one.sigma)))
         elif one.candidate.effect.scope == "recording":
             out.append(Advice(Kind.RECORD_AGAIN, (one.candidate.label,)))
-    out += together([(one, telling_turn(one.candidate.effect, plan)) for one in found if others(one)])
-    for one in found:
-        rivals = others(one)
-        if rivals and all(map(_in_catalogue, names := (one.candidate.label, rivals[0]))):
-            out.append(Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names))
-        if _in_sight(one):
-            out.append(_at_stake(one))
-    return out
+    closing = _closing(d, found)
+    closed = {members[0] for members, _ in closing}
+    still_open = [one for one in found if others(one) and one.candidate.label not in closed]
+    out += closing_advice(closing)
+    out += [_by_temperature(one) for one in still_open if _hangs_on_heat(one)]
+    out += together([(one, telling_stay(one.candidate.effect, plan)) for one in still_open if not _hangs_on_heat(one)])
+    return out + [_at_stake(one) for one in found if _in_sight(one)]
+
+
+def _closing(d: Diagnosis, found: Sequence[Found]) -> Closing:
+    """Find what to record next to tell apart what is open; nothing where there is no site."""
+    test = d.fit.test
+    if test.site is None or not any(map(others, found)):
+        return []
+    values = {one.candidate.parameter.name: one.value for one in found}
+    return next_recording(standing(d, found), Question(test.site, test.imu, d.fit.model), values)
+
+
+def _hangs_on_heat(one: Found) -> bool:
+    """Whether an effect, or the likeliest of what looks the same, is one of the temperature: no turn shows it."""
+    rival = others(one)[0]
+    of_rival = selection.resolve(rival).needs if in_catalogue(rival) else ""
+    return "temperature" in {one.candidate.effect.needs, of_rival}
+
+
+def _by_temperature(one: Found) -> Advice:
+    return Advice(Kind.NO_PLAN_TELLS, (one.candidate.label, others(one)[0]))
 
 
 def _about_many(d: Diagnosis) -> list[Advice]:
     """Advise where something is missing, and no effect by itself is likely."""
     families = d.probabilities.families if d.probabilities is not None else ()
     members = sorted((one for family in families for one in family.members), key=lambda one: -one.probability)
-    names = tuple(one.label for one in members if _in_catalogue(one.label))[:2]
+    names = tuple(one.label for one in members if in_catalogue(one.label))[:2]
     turns = [Advice(Kind.RANK_TURNS, (), Verb.RANK_TURNS, names)] if len(names) > 1 else []
     return [Advice(Kind.RECORD_MORE), *turns]
 
@@ -234,22 +257,16 @@ def _in_sight(one: Found) -> list[CoefficientShift]:
     return [s for s in one.coefficient_shifts if not one.may_be or without_variant(s.other) in named]
 
 
-def telling_turn(effect: Effect, plan: PlanSeen) -> Advice:
-    """Name the next turn or stop that would tell an effect from what looks the same, with minutes."""
+def telling_stay(effect: Effect, plan: PlanSeen) -> Advice:
+    """Say what would tell an effect from what looks the same where no plan foresees it, with minutes."""
     dwell = max(plan.dwell_minutes, 1.0)
-    needed = effect.excitation
-    if Excitation.TWO_RATES in needed and plan.one_rate():
-        return Advice(Kind.TURN_FASTER, (2 * (dwell + 0.3),))
-    if Excitation.BOTH_SENSES in needed and plan.one_sided():
-        return Advice(Kind.TURN_BACK, (dwell + 1.5,))
-    if Excitation.REPEATED_ATTITUDES in needed:
+    if Excitation.REPEATED_ATTITUDES in effect.excitation:
         return Advice(Kind.STAY_AND_RETURN, (_SLOW_MINUTES, dwell + 1.0))
-    if Excitation.OBLIQUE_STOPS in needed and not plan.oblique:
-        return Advice(Kind.REST_ON_DIAGONAL, (2 * (dwell + 0.6),))
     return Advice(Kind.REPEAT_TURN, (2 * (dwell + 0.5),))
 
 
-def _in_catalogue(name: str) -> bool:
+def in_catalogue(name: str) -> bool:
+    """Whether a label is one of a registered effect, and of no equation."""
     try:
         selection.resolve(name)
     except DataError:

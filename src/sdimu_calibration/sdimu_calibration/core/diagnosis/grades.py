@@ -11,7 +11,7 @@ from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effect_key import parse_key
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
-from sdimu_calibration.core.posterior.family import family_of
+from sdimu_calibration.core.posterior.family import BIAS_DRIFT, family_of
 from sdimu_calibration.core.posterior.told import Probabilities, Share
 from sdimu_calibration.core.probability import in_percent, in_percents
 from sdimu_calibration.core.recording import DataError
@@ -41,6 +41,8 @@ class Graded:
     """That one of it is missing; NaN where no probabilities were worked out."""
     may_be: tuple[Share, ...] = ()
     """What it may be, the likeliest first; one alone, or none, where it is told which."""
+    family: str = ""
+    """What all of these are alike in, in words; empty where their names say it."""
 
     @property
     def certain(self) -> bool:
@@ -57,9 +59,12 @@ def graded(found: Iterable[Found], told: Probabilities | None) -> tuple[Graded, 
     """Grade what was found: by its class, or by its family where that is surer."""
     every = tuple(found)
     named = {one.candidate.coefficient for one in every}
-    return tuple(
-        Graded(_sized(one), one.candidate.coefficient, size_of(one), *_grade(one, told, named)) for one in every
-    )
+    out = []
+    for one in every:
+        probability, shares = _grade(one, told, named)
+        family = _family(one, shares, told)
+        out.append(Graded(_sized(one), one.candidate.coefficient, size_of(one), probability, shares, family))
+    return tuple(out)
 
 
 def in_grades(found: Sequence[Graded], certain: str = "Certain") -> str:
@@ -78,6 +83,18 @@ def in_grades(found: Sequence[Graded], certain: str = "Certain") -> str:
     told += [f"Likely ({in_percent(one.probability)}): {_likely(one)}." for one in found if not one.certain]
     more = len(told) - LISTED
     return " ".join(told[:LISTED]) + (f" {more} more are in the table." if more > 0 else "")
+
+
+def _family(one: Found, shares: Sequence[Share], told: Probabilities | None) -> str:
+    """Name the slow change of a bias of which all shares are: ramp, warm-up and cable wrap do not say what they share.
+
+    `shares`: coefficients that it may be; `told`: with the families.
+    """
+    name, sensor = family_of(one.candidate)
+    members = [f.members for f in (told.families if told else ()) if (f.family, f.sensor) == (name, sensor)]
+    known = {without_variant(member.label) for every in members for member in every}
+    is_drift = name.endswith(BIAS_DRIFT) and all(share.name in known for share in shares)
+    return f"a slow change of the bias of {sensor.replace('_', ' ')}" if is_drift else ""
 
 
 def _grade(one: Found, told: Probabilities | None, named: Collection[str]) -> tuple[float, tuple[Share, ...]]:
@@ -113,7 +130,8 @@ def _open(one: Graded) -> str:
     percent = percents_of(one.may_be)
     told = [f"{named(s.name)}{sizes.get(s.name, '')} {percent[s.name]}" for s in shown]
     both = "; two of them may be there" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
-    return f"{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
+    of_family = f"{one.family} - " if one.family else ""
+    return f"{of_family}{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
 
 
 def percents_of(shares: Iterable[Share]) -> dict[str, str]:

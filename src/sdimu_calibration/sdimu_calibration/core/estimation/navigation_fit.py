@@ -461,6 +461,8 @@ def _in_noise(statistics: FitStatistics) -> str:
     nis, held_out = statistics.nis_in_noise, statistics.held_out_in_noise
     if nis is None or held_out is None:
         return "; 1 is right"
+    if max(nis, held_out) <= MISFIT:
+        return f"; 1 is right; in noise that stands for what is missing they are {nis:.3f} and {held_out:.3f}"
     fast = ": noise that moves within seconds is not in it" if nis > MISFIT else ""
     small = ", so the sigmas are too small" if nis > _FAST else ""
     return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}, 1 is right{fast}{small}"

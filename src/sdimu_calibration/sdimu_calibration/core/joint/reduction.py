@@ -24,6 +24,10 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 _ROUNDING = 1e-12
 """Ratio of an eigenvalue of the information, in units of the columns, to the largest from which it counts: below is
 rounding of sums over 1e5 rows."""
+_TELLS = 0.01
+"""Length of a row in units of the prior sigmas (1) from which it counts: a shorter one changes no sigma by 5e-5 of it.
+It is the difference of columns that are linear to 1e-5, as of gravity and a common scale factor, and holds what the
+linear model leaves there, which is no white noise."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = (), wander:
     if own > p:
         columns = _without(columns, p, evidence.weight[others], evidence.shift[others])
     W, e = columns[:, :-1], columns[:, -1]
-    A, y = compressed(W, e)
+    A, y = _telling(*compressed(W, e), evidence.weight[kept])
     point = -evidence.shift[kept]
     return Reduction(
         tuple(evidence.names[k] for k in kept),
@@ -120,6 +124,13 @@ def compressed(W: Floats, e: Floats) -> tuple[Floats, Floats]:
     seen = squares > _ROUNDING * squares[-1]
     V, size = V[:, seen], np.sqrt(squares[seen])
     return np.ascontiguousarray((size[:, None] * V.T) * length), (V.T @ (unit * (W.T @ e))) / size
+
+
+def _telling(A: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Leave out rows that tell nothing of the first parameters, whose prior information is `weight`, nor of others."""
+    squares, p = A[:, : len(weight)] ** 2 @ (1.0 / weight), len(weight)
+    kept = (squares > _TELLS**2) | np.any(A[:, p:] != 0.0, axis=1)
+    return A[kept], y[kept]
 
 
 def _without(columns: Floats, p: int, weight: Floats, shift: Floats) -> Floats:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.advice import adding
+from sdimu_calibration.core.diagnosis.closing import Closing, closing_advice, next_recording
 from sdimu_calibration.core.diagnosis.grades import LISTED, size
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
 from sdimu_calibration.core.diagnosis.search import Search
@@ -28,10 +29,10 @@ from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, 
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
 from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
-from sdimu_calibration.core.joint.set_standing import next_recording, standing_beside
+from sdimu_calibration.core.joint.set_standing import standing_beside
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, sentence, verdict_of_set
 from sdimu_calibration.core.plain_text import first_of
-from sdimu_calibration.core.plan_search import NextTurn
+from sdimu_calibration.core.plan_search import Question
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
@@ -44,8 +45,6 @@ from sdimu_calibration.core.wording import Work
 _SHARED = 10.0
 """Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
 its size cost less."""
-_TELLS = 3.0
-"""Significance (sigma) from which effects are told apart: a turn that reaches less is no advice."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def diagnose_set(
         before,
         facts.after if found.stood else facts.after.warned(TO_AND_FRO),
         found.threshold,
-        (*kept, *_advice(word, facts.findings, next_recording(found.after, standing, test), steps)),
+        (*kept, *_advice(word, facts.findings, _closing(found.after, standing), steps)),
         standing,
         found.first,
         again,
@@ -264,6 +263,15 @@ def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:
     return out
 
 
+def _closing(fit: SetFit, standing: Standing) -> Closing:
+    """Find what to record next; nothing where there is no site."""
+    test = fit.base.test
+    if test.site is None:
+        return []
+    values = dict(zip(fit.names, fit.estimate.values.tolist(), strict=True))
+    return next_recording(standing, Question(test.site, test.imu, fit.model), values)
+
+
 def _of_recordings(findings: Sequence[SetFinding]) -> dict[tuple[str, str], str]:
     """List what each recording alone shows, by the recording and that against which it stands."""
     found: dict[tuple[str, str], list[str]] = {}
@@ -274,10 +282,7 @@ def _of_recordings(findings: Sequence[SetFinding]) -> dict[tuple[str, str], str]
 
 
 def _advice(
-    word: Verdict,
-    findings: Sequence[SetFinding],
-    closing: Sequence[tuple[tuple[str, ...], NextTurn]],
-    steps: Sequence[Advice],
+    word: Verdict, findings: Sequence[SetFinding], closing: Closing, steps: Sequence[Advice]
 ) -> tuple[Advice, ...]:
     out = [*steps, *sites_to_check(findings)]
     closed = {members[0] for members, _ in closing}
@@ -291,11 +296,7 @@ def _advice(
         for f in findings
         if not f.recording and f.alike and f.label not in closed
     ]
-    for (label, *others), turn in closing:
-        if turn.after < _TELLS:
-            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, _TELLS), Verb.CONTINUE))
-        else:
-            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
+    out += closing_advice(closing)
     if word == Verdict.CLASS_OF_EFFECTS and not findings:
         out.append(Advice(Kind.RECORD_MORE))
     if word == Verdict.UNEXPLAINED:

@@ -1,4 +1,4 @@
-"""Where a set leaves its unit, and the recording that tells apart what all of its recordings leave open."""
+"""Where a set leaves its unit: what all of its recordings know of it."""
 
 from __future__ import annotations
 
@@ -8,21 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sdimu_calibration.core.effects import selection
-from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing, class_of, is_lasting, known_of
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values, set_evidence
 from sdimu_calibration.core.joint.set_fit import SetFit
-from sdimu_calibration.core.plan import Plan
-from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn
-from sdimu_calibration.core.recording import DataError
-
-_REST_S = 100.0
-"""Length of the rests of an advised recording (s): that of the plans, enough to level and to find north."""
-_ACCELERATION_RAD_S2 = math.radians(20.0)
-"""Acceleration of its turns (rad/s^2): half a second to the fastest rate of `next_turn`."""
 
 
 def set_standing(
@@ -84,44 +73,3 @@ def standing_beside(fit: SetFit, kept: Sequence[Candidate]) -> Standing:
     rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / sigma
     beside = replace(evidence, W=rows, e=np.zeros(len(rows)), stop=np.zeros(len(rows), dtype=np.int64))
     return set_standing(fit, beside, chosen, {})
-
-
-def next_recording(fit: SetFit, standing: Standing, test: PreparedTest) -> list[tuple[tuple[str, ...], NextTurn]]:
-    """Find the shortest recording that tells the members of each open class apart, all recordings counted.
-
-    Parameters
-    ----------
-    test : PreparedTest
-        One of its recordings: gives IMU and site.
-
-    Returns
-    -------
-    list of (tuple of str, NextTurn)
-        Each class with the turns between rests that tell most of it a minute; none where there is no site.
-    """
-    if test.site is None:
-        return []
-    stay = Plan("next", (_REST_S,), (), _ACCELERATION_RAD_S2)
-    found = []
-    for members in standing.open:
-        effects = [selection.resolve(e) for e in fit.model.effects]
-        have = {label for e in effects for label in e.labels}
-        added = [label for label in standing.added if label not in have and label not in members]
-        asked = Question(test.site, test.imu, with_effects(fit.model, added), standing.known)
-        try:
-            ranked = next_turn(stay, asked, members, _sizes(fit, standing, members))
-        except DataError:
-            continue
-        found.append((members, ranked[0]))
-    return found
-
-
-def _sizes(fit: SetFit, standing: Standing, members: Sequence[str]) -> dict[str, float]:
-    """Size (SI) of each member of a class if it were the cause: the first as estimated, the others to match it."""
-    names = [selection.resolve(label).parameters[0].name for label in members]
-    known = standing.known
-    J = known.of(names, np.ones(len(names)))
-    own = float(abs(fit.estimate.values[fit.names.index(names[0])])) if names[0] in fit.names else 0.0
-    if not own > 0.0:
-        return {}
-    return {name: own * float(abs(J[0, k]) / J[k, k]) for k, name in enumerate(names) if J[k, k] > 0.0}

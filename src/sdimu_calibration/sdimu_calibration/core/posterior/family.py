@@ -5,6 +5,9 @@ from __future__ import annotations
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.candidate import Candidate
 
+BIAS_DRIFT = "_bias_drift"
+"""How the name of a family ends that holds all that changes a bias slowly."""
+
 
 def family_of(candidate: Candidate) -> tuple[str, str]:
     """Name the family of a candidate, and its sensor.
@@ -24,5 +27,5 @@ def family_of(candidate: Candidate) -> tuple[str, str]:
     sensor = CHANNELS[channels[0]] if len(channels) == 1 else triads.pop() if len(triads) == 1 else ""
     # A bias that the turns add up to (cable wrap) is a slow change of it, too.
     slow = effect.bias_drift or (effect.wander_like and effect.shifts_bias)
-    family = f"{sensor[:-2]}_bias_drift" if slow and len(channels) == 1 else candidate.family
+    family = f"{sensor[:-2]}{BIAS_DRIFT}" if slow and len(channels) == 1 else candidate.family
     return family, f"{sensor} in {candidate.recording}".strip() if candidate.recording else sensor

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from dash import html
 
+from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
@@ -90,14 +91,21 @@ def span(one: tuple[float, float]) -> str:
     return "-".join(f"{t:.3f}".rstrip("0").rstrip(".") for t in one)
 
 
+def _telling(advice: Advice | None) -> list[Any]:
+    """Say what would tell apart what looks the same; nothing where nothing is known to."""
+    if advice is None:
+        return []
+    words = sentence(advice)
+    return [html.P(words if advice.verb else f"To tell them: {words}.")]
+
+
 def candidate(found: Preview, name: str) -> list[Any]:
     """Say what a candidate is, what it would take, what it cannot be told from, and what speaks against it."""
     effect, what = found.effect, found.what
     head = html.P(html.B(capital(effect.title)), id="candidate-name", **{"data-name": name})
     cause = [html.P(effect.description)] if effect.description else []
-    tells = "" if what.tells is None else sentence(what.tells)
     alike = (
-        [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), html.P(["To tell them: ", tells, "."])]
+        [html.P(["Looks the same here: ", ", ".join(what.alike), "."]), *_telling(what.tells)]
         if what.alike
         else [html.P("Nothing else looks the same here.")]
         if not what.objections

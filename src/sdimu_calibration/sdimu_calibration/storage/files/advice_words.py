@@ -163,16 +163,8 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"{capital(seen)}, so the shape of the scale factor cannot be seen: alternate 2 and 10 deg/s "
         "(shorter; the plan 'recommended')."
     ),
-    Kind.TURN_FASTER: lambda minutes: (
-        f"add a turn of 180 deg and back about that axis, level, at 10 deg/s ({minutes:.0f} min)"
-    ),
-    Kind.TURN_BACK: lambda minutes: f"add a turn of 180 deg about that axis in the other sense ({minutes:.0f} min)",
     Kind.STAY_AND_RETURN: lambda stay, again: (
         f"stay at the last stop for {stay:.0f} min more, then repeat the first stop ({stay + again:.0f} min together)"
-    ),
-    Kind.REST_ON_DIAGONAL: lambda minutes: (
-        f"add two stops on the body diagonal, X +45 deg and Y -35.3 deg and back ({minutes:.0f} min), or run the plan "
-        "'recommended'"
     ),
     Kind.REPEAT_TURN: lambda minutes: (
         f"repeat the turn that shows it in the other sense and at 10 deg/s ({minutes:.0f} min)"
