@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
-from sdimu_calibration.core.diagnosis.closing import Closing, closing_advice, next_recording
+from sdimu_calibration.core.diagnosis.closing import TELLS, Closing, closing_advice, next_recording
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import DetectableSize, Found
@@ -164,7 +164,10 @@ def _closing(d: Diagnosis, found: Sequence[Found]) -> Closing:
     if test.site is None or not any(map(others, found)):
         return []
     values = {one.candidate.parameter.name: one.value for one in found}
-    return next_recording(standing(d, found), Question(test.site, test.imu, d.fit.model), values)
+    every = next_recording(standing(d, found), Question(test.site, test.imu, d.fit.model), values)
+    # A change with time shows in a long stay: a whole plan is no better advice.
+    by_stay = {one.candidate.label for one in found if Excitation.REPEATED_ATTITUDES in one.candidate.effect.excitation}
+    return [(members, turn) for members, turn in every if turn.after >= TELLS or members[0] not in by_stay]
 
 
 def _hangs_on_heat(one: Found) -> bool:

@@ -24,7 +24,7 @@ REST_S = 100.0
 """Length of the rests of an advised recording (s): that of the plans, enough to level and to find north."""
 _ACCELERATION_RAD_S2 = math.radians(20.0)
 """Acceleration of its turns (rad/s^2): half a second to the fastest rate of `next_turn`."""
-_TELLS = 3.0
+TELLS = 3.0
 """Significance (sigma) from which effects are told apart: a turn that reaches less is no advice."""
 _MOST = 3
 """Number of classes for which a turn is looked for (1): each takes half a second, and people read no more."""
@@ -66,8 +66,8 @@ def closing_advice(closing: Closing) -> list[Advice]:
     """Advise the recording that closes each class, or a whole plan where no turn tells enough."""
     out = []
     for (label, *others), turn in closing:
-        if turn.after < _TELLS:
-            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, _TELLS), Verb.CONTINUE))
+        if turn.after < TELLS:
+            out.append(Advice(Kind.NO_TURNTELLS, (label, tuple(others), turn.after, TELLS), Verb.CONTINUE))
         else:
             out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
     return out
