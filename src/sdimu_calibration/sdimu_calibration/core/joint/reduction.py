@@ -24,8 +24,8 @@ from sdimu_calibration.core.noise_term import NoiseTerm
 _ROUNDING = 1e-12
 """Ratio of an eigenvalue of the information, in units of the columns, to the largest from which it counts: below is
 rounding of sums over 1e5 rows."""
-_TELLS = 0.01
-"""Length of a row in units of the prior sigmas (1) from which it counts: a shorter one changes no sigma by 5e-5 of it.
+_TELLS = 0.005
+"""Length of a row in units of the prior sigmas (1) from which it counts: a shorter one changes no sigma by 2e-5 of it.
 It is the difference of columns that are linear to 1e-5, as of gravity and a common scale factor, and holds what the
 linear model leaves there, which is no white noise."""
 
