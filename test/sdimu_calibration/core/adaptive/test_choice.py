@@ -71,6 +71,9 @@ def test_a_test_ends_when_all_limits_hold_and_says_what_lacks_when_time_is_up(kn
     end = choose(replace(known, noise=np.ones_like(known.noise)), wide, Menu(), 30.0)
     assert isinstance(end, End)
     assert end.reached
+    assert end.reason == "all limits hold and nothing is to be told apart"
+    found = replace(known, noise=np.ones_like(known.noise), named=("gyro_scale_asymmetry_y",))
+    assert "all limits hold with gyro_scale_asymmetry_y in the model" in choose(found, wide, Menu(), 30.0).reason
     late = choose(known, GOALS, Menu(), 0.1)
     assert isinstance(late, End)
     assert not late.reached

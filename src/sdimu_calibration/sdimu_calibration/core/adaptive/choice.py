@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from sdimu_calibration.core.adaptive.move import Move, Stand, led, length_s, mov
 from sdimu_calibration.core.adaptive.so_far import SoFar, ahead
 from sdimu_calibration.core.adaptive.worth import Worth, worth
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.table import Step
 
 FIRST_STOP_S = 20.0
@@ -25,6 +26,8 @@ _WORDS_NAT = 0.1
 """Gain (nat) from which a reason tells of a class: odds of 1.1 to 1."""
 _MORE_DIGITS = 4
 """Digits that a reason may write a sigma over its limit in beyond the usual (1): a smaller difference tells nothing."""
+_NAMED = 4
+"""Number of effects in the model that a line names: more do not fit into it."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ def choose(
     stand = Stand(known, goals, menu, known.at if at is None else at, minutes_left, possible)
     now = stand.now
     if now.reached(needed_of(known))[0]:
-        return End("all limits hold and nothing is to be told apart", reached=True)
+        return End(f"all limits hold{_beside(known.named)} and nothing is to be told apart", reached=True)
     found = moves(stand)
     if not found:
         return End(f"the time is up; {_lacking(known, now)}", reached=False)
@@ -174,6 +177,11 @@ def _choice(stand: Stand, best: Move) -> Choice:
         float(_told(known, after, row, now).sum()),
         best.done and best.first is None,
     )
+
+
+def _beside(named: Sequence[str]) -> str:
+    """Say with what in the model limits hold: a calibration without it has other sigmas."""
+    return f" with {first_of(named, _NAMED)} in the model" if named else ""
 
 
 def _lacking(known: Knowledge, now: Worth) -> str:
