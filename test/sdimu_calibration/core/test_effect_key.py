@@ -86,3 +86,8 @@ def test_a_size_is_written_to_the_last_digit():
     assert str(key).startswith("gyro_bias_warm_up_x(tau=300 s)=0.0333")
     number, _, unit = key.size.partition(" ")
     assert to_si(float(number), unit) == pytest.approx(value, rel=1e-15)
+
+
+def test_options_that_are_left_out_are_said_to_be_lacking():
+    with pytest.raises(DataError, match=r"expected gyro_bias_warm_up_y\(tau=1 s\), and no options are stated"):
+        read_options(parse_key("gyro_bias_warm_up_y=0.03 deg/h"), {"tau": "s"})

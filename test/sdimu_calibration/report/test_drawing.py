@@ -115,3 +115,10 @@ def test_marks_in_names_of_the_user_are_shown_and_not_obeyed():
         assert "&lt;b&gt;" in said
         assert "<b>bold" not in said
         assert "<a href" not in said
+
+
+def test_every_row_of_a_heat_map_has_its_name():
+    drawn = evidence_figures.deviates(
+        ["1", "2"], [f"row {k}" for k in range(9)], np.ones((9, 2)), "stop", "channel", 200
+    )
+    assert drawn.layout["yaxis"]["dtick"] == 1

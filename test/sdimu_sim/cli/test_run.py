@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.processes import own_domain, own_folder
 from sdimu_calibration.core.advice import Advice, Kind
+from sdimu_calibration.core.diagnosis.advice import Untestable
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.journal import JOURNAL
@@ -135,11 +136,17 @@ def test_turns_that_the_test_chose_itself_are_not_scolded():
     @dataclass(frozen=True)
     class Summary:
         advice: tuple[Advice, ...]
+        untestable: tuple[Untestable, ...]
 
     kept = Advice(Kind.REPEAT_STOPS)
     told = Summary(
-        (Advice(Kind.SIGNED_TURNS, ("all turns are positive",)), kept, Advice(Kind.TWO_RATES, ("one rate",)))
+        (Advice(Kind.SIGNED_TURNS, ("all turns are positive",)), kept, Advice(Kind.TWO_RATES, ("one rate",))),
+        (Untestable("all turns have one rate: drive others", ("a",)), Untestable("coefficients take it: it", ("b",))),
     )
+    assert [one.reason for one in without_scolding(told, "table33").untestable] == [
+        "all turns have one rate",
+        "coefficients take it: it",
+    ]
     assert without_scolding(told, "table33").advice == (kept,)
     assert without_scolding(told, None) == told
 

@@ -117,7 +117,8 @@ def read_options(key: EffectKey, expected: Mapping[str, str]) -> dict[str, float
     if set(key.options) != set(expected):
         example = variant({name: f"1 {unit}".removesuffix(" 1") for name, unit in expected.items()})
         wanted = f"expected {key.name}{example}" if expected else "it takes no options"
-        raise DataError(f"effect '{key.name}': {wanted}, not '{variant(key.options)}'")
+        given = f"not '{variant(key.options)}'" if key.options else "and no options are stated"
+        raise DataError(f"effect '{key.name}': {wanted}, {given}")
     values = {
         name: read_quantity(f"effect '{key.name}': {name}", key.options[name], expected[name]) for name in expected
     }

@@ -375,8 +375,15 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     return result
 
 
+_ABOUT_TURNS = ("all turns ", "every turn ")
+"""How reasons begin that end in what to drive."""
+
+
 def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisSummary:
-    """Leave out advice to drive other turns where the test itself chose them: its goals ask for what they show."""
+    """Leave out advice to drive other turns where the test itself chose them: its goals ask for what they show.
+
+    Why an effect is not seen stays, without what to drive in its place.
+    """
     from dataclasses import replace
 
     from sdimu_calibration.core.advice import Kind
@@ -384,7 +391,12 @@ def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisS
     if goals is None:
         return summary
     about_turns = {Kind.SIGNED_TURNS, Kind.TWO_RATES}
-    return replace(summary, advice=tuple(one for one in summary.advice if one.kind not in about_turns))
+    unseen = tuple(
+        replace(one, reason=one.reason.partition(": ")[0]) if one.reason.startswith(_ABOUT_TURNS) else one
+        for one in summary.untestable
+    )
+    advice = tuple(one for one in summary.advice if one.kind not in about_turns)
+    return replace(summary, advice=advice, untestable=unseen)
 
 
 def _write_plan(part: Path, out: Path, test: LiveTest, summary: DiagnosisSummary) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -231,3 +232,9 @@ def test_a_test_that_has_ended_shows_no_bar_that_seems_to_wait():
     head = Head("stop 3", share=0.1)
     assert "Progress" in str(parts.place(head))
     assert "Progress" not in str(parts.place(replace(head, end=End(True, "The test has ended.", ""))))
+
+
+@pytest.mark.parametrize(("share", "words"), [(1.0, "100 %"), (0.995, "100 %"), (0.0123, "1.2 %")])
+def test_a_share_is_written_without_exponent(share, words):
+    view = SimpleNamespace(fallen=[SimpleNamespace(effect="gyro_scale", share=share)])
+    assert f", {words} of its sigma" in parts.largest(view)

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report.data import Grid
 from sdimu_calibration.report.workbench.figures import heat_map
 from sdimu_calibration.report.workbench.fit import Missing
+from sdimu_calibration.report.workbench.own_effect import stated_priors
 from sdimu_calibration.report.workbench.parts import verdict
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State, from_json
-from sdimu_calibration.report.workbench.steps import step
+from sdimu_calibration.report.workbench.steps import _set_prior, step
 
 
 def test_undo_goes_back_through_every_step():
@@ -108,3 +110,21 @@ def test_numbers_of_many_stops_do_not_run_into_each_other():
     assert "%{z" in drawn["hovertemplate"]
     few = heat_map(Grid(np.arange(19), value[:, :19]), (6, 3)).data[0]
     assert few["text"][6][3] == "\N{MINUS SIGN}4.2"
+
+
+@pytest.mark.parametrize(
+    ("mean", "sigma", "message"),
+    [
+        ("", "5", "value of accel_bias_y: write a number with its unit"),
+        ("110 ug", "", "sigma of accel_bias_y: write a number with its unit"),
+    ],
+)
+def test_a_field_that_is_empty_is_named_as_people_call_it(mean, sigma, message):
+    controls = {"coefficient": "accel_bias_y", "mean": mean, "sigma": sigma}
+    with pytest.raises(DataError, match=message):
+        _set_prior(State(), controls)
+
+
+def test_a_prior_without_a_unit_says_so():
+    with pytest.raises(DataError, match="prior of accel_bias_y: 'abc' and '5': write numbers with a unit"):
+        stated_priors((), [("accel_bias_y", "abc", "5")])

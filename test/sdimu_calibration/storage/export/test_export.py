@@ -367,3 +367,8 @@ def test_a_lower_triangular_form_refuses_another_frame_in_one_line(form: str, tm
 def test_an_unknown_form_names_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="expected one of matrices, kalibr"):
         export("excel", tmp_path / "x", result(*BASELINE), IMU)
+
+
+def test_a_form_that_cannot_be_says_what_to_do_instead(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="keep the calibration of the factory, .*sdimu compensate"):
+        export("xsens", tmp_path / "x", result(*BASELINE), IMU)

@@ -67,7 +67,7 @@ def closing_advice(closing: Closing) -> list[Advice]:
     out = []
     for (label, *others), turn in closing:
         if turn.after < TELLS:
-            out.append(Advice(Kind.NO_TURNTELLS, (label, tuple(others), turn.after, TELLS), Verb.CONTINUE))
+            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, TELLS), Verb.CONTINUE))
         else:
             out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
     return out

@@ -135,4 +135,5 @@ def largest(view: LiveView) -> str:
     if not view.fallen:
         return ""
     worst = view.fallen[0]
-    return f"Known least: {title(worst.effect)}, {100.0 * worst.share:.2g} % of its sigma at the start is left."
+    left = f"{100.0 * worst.share:.0f}" if worst.share > 0.1 else f"{100.0 * worst.share:.2g}"
+    return f"Known least: {title(worst.effect)}, {left} % of its sigma at the start is left."

@@ -39,7 +39,8 @@ def _stated(name: str, mean: str, sigma: str) -> StatedPrior:
         unit = sigma.partition(" ")[2].strip()
         return StatedPrior(name, parse_quantity(mean, unit or "1"), parse_quantity(sigma, unit or "1"), unit)
     except UnitError as error:
-        raise DataError(f"prior of {name}: {error}") from error
+        why = str(error) if unit else f"'{mean}' and '{sigma}': write numbers with a unit, as its row shows them"
+        raise DataError(f"prior of {name}: {why}") from error
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:

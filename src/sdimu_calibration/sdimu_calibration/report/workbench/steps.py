@@ -88,11 +88,17 @@ def _coefficient(controls: Controls) -> str:
     return str(controls["coefficient"])
 
 
+_FIELDS = {"mean": "value", "sigma": "sigma"}
+"""What people call the fields of a prior."""
+
+
 def _quantity(controls: Controls, name: str) -> str:
     """Text of a quantity, with one blank before its unit."""
     text = " ".join(str(controls[name] or "").split())
     if not text:
-        raise DataError(f"{name}: write a quantity with its unit, such as 1.5 deg/h")
+        raise DataError(
+            f"{_FIELDS[name]} of {_coefficient(controls)}: write a number with its unit, as its row shows it"
+        )
     return text
 
 

@@ -50,6 +50,13 @@ FORMS = {
 }
 
 
+_NO_FORM = {
+    "xsens": "units of Xsens keep the calibration of the factory, and take no other: compensate their samples on the "
+    "host (sdimu compensate; doc/using-the-result.md)"
+}
+"""Why there is no form for what people ask for."""
+
+
 class Exported(NamedTuple):
     """What was written: files, and what they cannot hold, one line each."""
 
@@ -87,7 +94,8 @@ def export(
         Asked of every file before the first is written: raises where one must not be.
     """
     if form not in FORMS:
-        raise DataError(f"--format {form}: expected one of {', '.join(FORMS)}")
+        why = _NO_FORM.get(form, f"expected one of {', '.join(FORMS)}")
+        raise DataError(f"--format {form}: {why}")
     if path.is_dir():
         raise DataError(f"{path}: is a folder; name a file to write")
     linear = linear_model(calibration, own)
