@@ -370,5 +370,5 @@ def test_an_unknown_form_names_those_there_are(tmp_path: Path) -> None:
 
 
 def test_a_form_that_cannot_be_says_what_to_do_instead(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="keep the calibration of the factory, .*sdimu compensate"):
+    with pytest.raises(DataError, match=r"keep the calibration of the factory, .*sdimu compensate"):
         export("xsens", tmp_path / "x", result(*BASELINE), IMU)
