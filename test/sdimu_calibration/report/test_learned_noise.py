@@ -17,6 +17,7 @@ from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis_
 from sdimu_calibration.core.estimation.free_inertial import NOTHING
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
+from sdimu_calibration.core.note import Topic
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.report import first_screen, sections
 from sdimu_calibration.report.page import Contents, page
@@ -70,6 +71,17 @@ def test_the_first_screen_of_a_fit_does_so_too(learned):
     costs = first_screen.of_fit(learned.after).costs
     assert right_at_one(costs) == ["1.08", "1.303"]
     assert any(number == "7.05" and "white noise" in words for number, words in costs)
+
+
+def test_a_misfit_shows_no_figure_in_the_noise_that_stands_for_it(learned):
+    said = as_note(
+        "the model in white noise does not fit (NIS 3.1, held-out error 7.1; 1 is right); run: sdimu diagnose"
+    )
+    assert said.topic == Topic.MISFIT
+    in_place = {**learned.after.fit, "held_out_in_noise": 0.998, "nis_in_noise": 1.014}
+    costs = first_screen.of_fit(replace(learned.after, warnings=(said,), fit=in_place)).costs
+    assert costs[0][0] == "7.05"
+    assert not {"1.00", "1.014"} & {number for number, _ in costs}
 
 
 def test_a_page_without_learned_noise_says_nothing_of_white_noise(diagnosis):

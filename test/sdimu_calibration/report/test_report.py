@@ -18,6 +18,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.ladder import Rung, error_ladder
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.error_figures import held_out
+from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.report import (
     data,
     evidence_figures,
@@ -270,3 +271,13 @@ def test_tables_of_many_columns_stand_below_each_other(diagnosis):
 def test_a_stamp_that_counts_from_a_start_is_no_date():
     assert recorded(101_200_000_000) == ""
     assert recorded(1_700_000_000_000_000_000) == "2023-11-14 22:13:20 UTC"
+
+
+def test_a_coefficient_that_is_confused_has_no_time_constant_beside_the_probability_of_all_of_them(diagnosis):
+    one = summarise(diagnosis).found[0]
+    alike = ("accel_bias_warm_up_x(tau=2400 s)", "accel_bias_warm_up_x(tau=1200 s)")
+    open_ = replace(one, alike=alike, together=(), may_be=(Share("accel_bias_warm_up_x", 0.16),))
+    told = confused(replace(summarise(diagnosis), found=(open_,)))
+    assert "accelerometer warm-up transient, x" in told
+    assert " 16 %" in told
+    assert "tau=" not in told

@@ -11,7 +11,7 @@ from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
-from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
+from sdimu_calibration.core.diagnosis.grades import NAMED, named, percents_of
 from sdimu_calibration.core.diagnosis.ladder import Rung
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
@@ -23,7 +23,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
 from sdimu_calibration.report.advice import Spell, advice_html
-from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip, title_of
+from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip
 from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
@@ -240,7 +240,8 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         # Time constants of one coefficient share its probability: it stands once.
         alike = {name.partition("(")[0]: name for name in reversed(one.alike)}
         others = "; ".join(
-            tip(title_of(name), effect_of_key(name), [name]) + shares.get(coefficient, "")
+            # The probability is that of the coefficient with any time constant: so its name is, too.
+            tip(named(coefficient), effect_of_key(name), [coefficient]) + shares.get(coefficient, "")
             for coefficient, name in list(reversed(alike.items()))[:6]
             if coefficient != one.candidate.coefficient
         )

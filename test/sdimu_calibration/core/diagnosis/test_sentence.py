@@ -163,6 +163,24 @@ def test_a_fault_of_the_recording_is_told_by_itself_with_size_and_probability(su
     assert "lost" not in equation.partition("The data have a fault")[0]
 
 
+def test_a_slow_change_of_a_bias_is_told_as_that_before_what_it_may_be(summary):
+    (effect,) = summary.found
+    (drift,) = split(resolve("gyro_bias_ramp_y"))
+    shares = (("gyro_bias_ramp_y", 0.55), ("gyro_bias_warm_up_y", 0.16))
+    members = tuple(
+        MemberShare(label, p, 1.0, 0.1, "rad/s", "deg/h")
+        for label, p in (("gyro_bias_ramp_y", 0.55), ("gyro_bias_warm_up_y(tau=600 s)", 0.16))
+    )
+    told = Probabilities(0.1, (FamilyShare("gyro_bias_drift", "gyro_y", 0.83, members),), ())
+    one = replace(effect, candidate=drift, probability=0.83, of_family=0.83, may_be=tuple(Share(*s) for s in shares))
+    words = in_grades(graded([one], told))
+    assert words.startswith("Likely (83 %): a slow change of the bias of gyro y - gyro bias ramp, y (")
+    # What else it may be is no slow change: then the names say more than the family.
+    other = replace(one, may_be=(*one.may_be, Share("gyro_scale_asymmetry_y", 0.1)))
+    assert "slow change" not in in_grades(graded([other], told))
+    assert "slow change" not in said(with_shares(summary, 0.995, (own(summary), 0.82), ("accel_cubic_x", 0.18)))
+
+
 def test_what_no_single_effect_is_probable_for_lists_the_likeliest(summary):
     ranked = (("accel_cubic", 0.3), ("accel_quadratic", 0.2))
     families = tuple(
