@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.verdict import POSSIBLE, beyond, error_fal
 from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import without_advice
+from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
 from sdimu_calibration.report.cost import in_use, wrong_without
@@ -51,7 +52,8 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, mor
     for text in cost_lines(summary, more):
         line(console, text)
     for finding in d.findings:
-        line(console, f"data: {finding.text}")
+        if capital(finding.text) not in said:
+            line(console, f"data: {finding.text}")
     for text in d.noise:
         if text not in said:
             line(console, f"noise: {text}")

@@ -11,7 +11,7 @@ import pytest
 from sdimu_calibration.cli.diagnosis_text import candidate_rows
 from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.advice import advice, handheld_advice
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, _beside_wrong_prior
 from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
@@ -374,3 +374,11 @@ def test_what_a_set_finds_beside_what_is_unexplained_has_its_grade(summary):
     words = sentence_of_set(Verdict.UNEXPLAINED, facts)
     assert words.startswith("Something differs between the recordings that no effect of the catalogue explains. ")
     assert "Found beside it: Likely (70 %): gyro warm-up" in words
+
+
+def test_what_was_found_beside_a_prior_that_the_data_contradict_is_said_to_hang_on_it():
+    base = SimpleNamespace(contradicted_priors=lambda: ["the stated prior of a contradicts the data", "that of b too"])
+    told = "The stated prior of a contradicts the data. If it holds all the same: "
+    assert _beside_wrong_prior(base, SimpleNamespace(chosen=("effect",))) == told
+    assert _beside_wrong_prior(base, SimpleNamespace(chosen=())) == ""
+    assert _beside_wrong_prior(SimpleNamespace(contradicted_priors=list), SimpleNamespace(chosen=("effect",))) == ""

@@ -35,6 +35,7 @@ from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
+from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.posterior.told import Probabilities, Share, may_be, probabilities
 from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
@@ -227,7 +228,14 @@ def climb(
         rungs,
     )
     found = found_effects(unspoken)
-    return replace(unspoken, sentence=sentence(unspoken, found), found_effects=found)
+    said = f"{_beside_wrong_prior(base, done)}{sentence(unspoken, found)}"
+    return replace(unspoken, sentence=said, found_effects=found)
+
+
+def _beside_wrong_prior(base: Fit, done: Round) -> str:
+    """Say before what was found that a stated prior contradicts the data: effects may be there for its sake alone."""
+    against = base.contradicted_priors() if done.chosen else []
+    return f"{capital(against[0])}. If it holds all the same: " if against else ""
 
 
 def _facts(done: Round, grave: bool, unexplained: bool, own: bool, noise: bool) -> Facts:
