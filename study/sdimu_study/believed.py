@@ -19,12 +19,12 @@ from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.learned_noise import MOST_TERMS
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import MARKOV, RANDOM_WALK, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_models import MARKOV_S, MARKOV_SPREAD, ODDS, usual_sizes
-from sdimu_calibration.core.posterior.noise_search import MOST_TERMS
 from sdimu_calibration.core.posterior.prior import MEAN_NUMBER, WIDTH_SHARES, WIDTHS
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si

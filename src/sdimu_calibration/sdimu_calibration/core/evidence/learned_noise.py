@@ -47,7 +47,7 @@ LEAST_GAIN = 5.0
 reaches it."""
 _TUNING = tuple(1.25**k for k in range(-4, 5))
 """Ratios of time constants to the one that was found: to its neighbours, and a fifth beyond."""
-_MOST_TERMS = 2
+MOST_TERMS = 2
 """Number of noise terms of a triad at most: a test of an hour tells no more apart."""
 _SWEEPS = 3
 """Number of times that all sizes are optimised in turn: a fourth changes them by less than a tenth of their sigma."""
@@ -225,7 +225,7 @@ def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequenc
 
 def _room(terms: Sequence[NoiseTerm], term: NoiseTerm) -> bool:
     of_triad = [t for t in terms if t.triad == term.triad]
-    return len(of_triad) < _MOST_TERMS and term.kind not in {t.kind for t in of_triad}
+    return len(of_triad) < MOST_TERMS and term.kind not in {t.kind for t in of_triad}
 
 
 def kinds(cut: Stretches) -> list[NoiseTerm]:

@@ -12,7 +12,7 @@ from itertools import chain, product, repeat
 
 import numpy as np
 
-from sdimu_calibration.core.evidence.learned_noise import InModes, InTriad, NoiseInformation
+from sdimu_calibration.core.evidence.learned_noise import MOST_TERMS, InModes, InTriad, NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.noise_term import DRAWN, TRIADS, Identity, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel, Sizes, every_kind, log_odds
@@ -35,8 +35,6 @@ _BEHIND = 30.0
 """Log posterior (1) that noise may be behind effects in its place: effects beside it may make up for it."""
 SEEN = 0.5
 """Log-likelihood (1) that a term must gain to be told from none: less is its prior."""
-MOST_TERMS = 2
-"""Number of terms of a triad at most: a test of an hour tells no more apart."""
 _SMALLER = 0.5
 """Size of noise beside an effect over that found beside none (1): the effect made most of it."""
 _MOST_DRAWN = 3
