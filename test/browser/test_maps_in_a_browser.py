@@ -1,4 +1,4 @@
-"""Heat maps of a long plan in Chromium: a number is in its cell, or a sign is, on every width of a window."""
+"""Heat maps in Chromium: a number is in its cell, or a sign is, on every width of a window; each row has its name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import pytest
 from sdimu_calibration.report import data
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.evidence_figures import deviates, heat_map
+from sdimu_calibration.report.evidence_figures import deviates, heat_map, heat_maps
+
+from .conftest import crossing_labels
 
 STOPS = 28
 """Stops of the longest plan that the repository holds."""
@@ -61,3 +63,35 @@ def test_no_number_is_wider_than_its_cell(browser: Any, maps: Path, width: int) 
         # Where only signs stand, numbers would not have fitted; what is written can be read.
         assert one["longest"] > 1 or one["cell"] < 29.0, one
         assert one["least"] >= 9.5, one
+
+
+_LEAST_PX = {1440: 250, 3840: 375}
+"""Least height of the map of a first screen (px), by the width of the window: `LEAST` of design/figures.js."""
+_LOWEST = """document.addEventListener('DOMContentLoaded', () => {
+    const card = document.querySelector('#verdict .card'), map = card.querySelector('.plotly-graph-div');
+    const large = window.innerWidth >= 2400 ? 1.5 : 1;
+    map.style.height = 330 * large + 'px';
+    const free = window.innerHeight - card.getBoundingClientRect().bottom + 330 * large;
+    card.style.marginTop = free - 250 * large + 'px';
+});"""
+"""Puts the card so far down that its map is as low as it may be."""
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (3840, 2160)])
+def test_every_row_of_the_lowest_map_of_a_first_screen_has_its_name(
+    browser: Any, tmp_path: Path, width: int, height: int
+) -> None:
+    drawn = heat_maps([data.Grid(np.arange(19), np.ones((12, 19)))])
+    body = f'<div id="verdict"><section class="card">{html(drawn, 1)}</section></div>'
+    (tmp_path / "map.html").write_text(document("Map", body), encoding="utf-8")
+    page = browser.new_page(viewport={"width": width, "height": height})
+    page.add_init_script(_LOWEST)
+    page.goto((tmp_path / "map.html").as_uri())
+    page.wait_for_function("document.querySelector('#verdict .js-plotly-plot .main-svg')")
+    shown = page.evaluate("document.querySelector('#verdict .js-plotly-plot')._fullLayout.height")
+    names = page.locator("#verdict .ytick text").count()
+    crossing = crossing_labels(page)
+    page.close()
+    assert shown == pytest.approx(_LEAST_PX[width], abs=2)
+    assert names == 12
+    assert crossing == []

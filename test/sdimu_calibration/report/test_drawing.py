@@ -122,3 +122,5 @@ def test_every_row_of_a_heat_map_has_its_name():
         ["1", "2"], [f"row {k}" for k in range(9)], np.ones((9, 2)), "stop", "channel", 200
     )
     assert drawn.layout["yaxis"]["dtick"] == 1
+    # They have the size of the page, which grows with its screen.
+    assert "tickfont" not in drawn.layout["yaxis"]

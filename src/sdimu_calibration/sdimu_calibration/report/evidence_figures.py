@@ -73,8 +73,8 @@ def deviates(
         hovertemplate=f"%{{y}} at {column} %{{x}}: %{{z:+.1f}} sigma<extra></extra>",
     )
     figure.x_axes(title=column, type="category", showgrid=False, ticks="")
-    # A row whose name is left out for room cannot be read.
-    figure.y_axes(autorange="reversed", ticks="", title=line, dtick=1, tickfont={"size": 11})
+    # A row whose name is left out for room cannot be read; one in small letters is hard to read on a screen of 4K.
+    figure.y_axes(autorange="reversed", ticks="", title=line, dtick=1)
     return lay_out(figure, height, margin={"l": 120 if line == "channel" else 190, "r": 20, "t": 40, "b": 55})
 
 
