@@ -37,7 +37,9 @@ class Now:
         rank = ((EFFECT, "+27.4 sigma, 41 ppm"), ("accel_quadratic_z", "+9.1 sigma, 30 ug/g^2"))
         self.ladders = dict.fromkeys(range(1, stop + 1), (("as given", "2.42"),))
         said, noise = "2 candidates stand out of the noise.", "noise reaches 3.8"
-        self.diagnosis = SeenDiagnosis(stop, "misfit", said, noise, rank, self.ladders[stop], CHANNELS, stops, heat)
+        self.diagnosis = SeenDiagnosis(
+            stop, "misfit", said, noise, rank, self.ladders[stop], CHANNELS, stops, heat, standing=2
+        )
         self.choices = [SeenChoice("Y +90 deg at 10 deg/s: brings gyro_bias", 3.3, 1.6)]
 
 

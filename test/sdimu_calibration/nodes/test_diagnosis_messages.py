@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, ModelError
+from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis, ModelError, Ranked
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, Probabilities
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.nodes.diagnosis_messages import diagnosis, seen_diagnosis
@@ -37,3 +37,13 @@ def test_before_the_end_there_are_no_probabilities():
 def test_every_verdict_is_read_again(verdict):
     found = LiveDiagnosis(**{**vars(FOUND), "verdict": verdict})
     assert seen_diagnosis(diagnosis(10**9, found), SeenDiagnosis()).verdict == verdict
+
+
+def test_a_page_knows_which_candidates_stand_out_of_the_noise():
+    # Two variants of one candidate are one row of the table.
+    scores = {"a_x(tau=1 s)": -9.0, "a_x(tau=2 s)": 8.0, "b_x": 3.7, "c_x": 3.66}
+    ranking = tuple(Ranked(label, z, 1e-6 * z, 1e-6, "1") for label, z in scores.items())
+    message = diagnosis(10**9, LiveDiagnosis(**{**vars(FOUND), "ranking": ranking, "threshold": 3.67}))
+    seen = seen_diagnosis(message, SeenDiagnosis())
+    assert [label for label, _ in seen.ranking] == ["a_x(tau=1 s)", "b_x", "c_x"]
+    assert seen.standing == 2

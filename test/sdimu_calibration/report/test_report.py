@@ -30,7 +30,7 @@ from sdimu_calibration.report import (
 )
 from sdimu_calibration.report.coefficients import as_csv, as_yaml, grouped_table
 from sdimu_calibration.report.evidence_figures import heat_maps
-from sdimu_calibration.report.markup import prose, section
+from sdimu_calibration.report.markup import prose, section, signs
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.sections import confused, found_table
@@ -281,3 +281,13 @@ def test_a_coefficient_that_is_confused_has_no_time_constant_beside_the_probabil
     assert "accelerometer warm-up transient, x" in told
     assert " 16 %" in told
     assert "tau=" not in told
+
+
+@pytest.mark.parametrize("text", ["of 2026-11-28", "stops 3-5", "1e-05 rad", "held-out", "gyro_x: ey^2-ez^2"])
+def test_a_hyphen_that_begins_no_number_stays(text):
+    assert signs(text) == text
+
+
+@pytest.mark.parametrize("text", ["-9.1 sigma", "turn X -180 deg", "gyro_bias_y (-3.0 deg/h)", "by -.5 ug"])
+def test_a_hyphen_that_begins_a_number_is_a_sign_of_minus(text):
+    assert signs(text) == text.replace("-", "\N{MINUS SIGN}")

@@ -23,6 +23,8 @@ from sdimu_calibration.report.odds_section import family_in_words
 
 NOTHING = "nothing_missing"
 """Key of the probability that no effect is missing."""
+RANKED_ABOVE = "ranked_above"
+"""Key of the number of rows of the ranking, from its begin, that stand out of the noise."""
 _MOST_RANKED = 12
 """Number of candidates in the table for people."""
 
@@ -78,17 +80,19 @@ def seen_diagnosis(message: DiagnosticArray, before: SeenDiagnosis) -> SeenDiagn
     parts = {status.name: status for status in message.status}
     tables = {name: tuple((v.key, v.value) for v in status.values) for name, status in parts.items()}
     about = dict(tables["verdict"])
-    odds = dict(tables.get("probabilities", ()))
+    odds, ranked = dict(tables.get("probabilities", ())), tables.get("ranking", ())
     return replace(
         before,
         stop=int(about["stop"]),
         verdict=about["verdict"],
         sentence=parts["verdict"].message,
         reaches=parts["ranking"].message if "ranking" in parts else "",
-        ranking=tables.get("ranking", ()),
+        ranking=ranked,
         ladder=tables.get("ladder", ()),
         nothing=float(odds.get(NOTHING, math.nan)),
         families=tuple(_family(name, told) for name, told in tables.get("families", ())),
+        # A node of an earlier version does not say it: then none is left out.
+        standing=int(about.get(RANKED_ABOVE, len(ranked))),
     )
 
 
@@ -108,6 +112,7 @@ def _verdict(found: LiveDiagnosis) -> Iterable[tuple[str, str]]:
         return
     yield "threshold", f"{found.threshold:.6g}"
     yield "candidates_above", str(len(found.standing))
+    yield RANKED_ABOVE, str(len(best_ranked(found.standing)))
     yield "largest_score", f"{max((abs(r.z) for r in found.ranking), default=0.0):.6g}"
     yield "best", found.ranking[0].label if found.standing else "none"
     yield "p_unexplained", f"{found.p_value:.3g}"

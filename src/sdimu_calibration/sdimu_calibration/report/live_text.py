@@ -69,6 +69,8 @@ class SeenDiagnosis:
     """Probability that no effect is missing; NaN before the test has ended."""
     families: tuple[SeenFamily, ...] = ()
     """The likeliest first; none before the test has ended."""
+    standing: int = 0
+    """Number of candidates that stand out of the noise: the first of `ranking`."""
 
     @property
     def line(self) -> str:

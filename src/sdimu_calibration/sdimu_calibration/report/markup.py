@@ -64,7 +64,11 @@ def signs(text: str) -> str:
     No line ends between a number and its sigma or its per cent.
     """
     together = text.replace(" +- ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
-    return together.replace("(-", "(\N{MINUS SIGN}")
+    return _MINUS.sub("\N{MINUS SIGN}", together)
+
+
+_MINUS = re.compile(r"(?<![^\s(])-(?=\.?\d)")
+"""A hyphen that begins a number: not one of a range, a date, an exponent or a name."""
 
 
 def quiet(text: str) -> str:

@@ -26,6 +26,7 @@ MISFIT = SeenDiagnosis(
     ("gyro_x", "gyro_y"),
     ("0", "1", "2", "3"),
     np.array([[0.4, -4.2, 0.1, np.nan], [0.0, 1.0, 11.7, -2.9]]),
+    standing=2,
 )
 DRIFT = SeenFamily("Slow change of the bias, gyro y", 0.97, (("gyro_bias_step_y(t0=300 s)", 0.6), ("warm_up", 0.37)))
 

@@ -96,7 +96,7 @@ def test_the_page_shows_where_the_test_is_what_it_knows_and_where_it_fails():
     assert "gyro_scale_asymmetry_y +27.4 sigma, 41 ppm" in words(shown["candidates"]["children"])
     assert shown["verdict"]["className"] == "verdict doubtful"
     told = words(shown["choices"]["children"])
-    assert told.index("Y +90 deg: brings gyro_bias") < told.index("X -180 deg: brings accel_bias")
+    assert told.index("Y +90 deg: brings gyro_bias") < told.index("X \N{MINUS SIGN}180 deg: brings accel_bias")
     assert "1.61" in told
     assert shown["candidate"]["options"][0]["value"] == "gyro_scale_asymmetry_y"
 
@@ -234,7 +234,32 @@ def test_a_test_that_has_ended_shows_no_bar_that_seems_to_wait():
     assert "Progress" not in str(parts.place(replace(head, end=End(True, "The test has ended.", ""))))
 
 
-@pytest.mark.parametrize(("share", "words"), [(1.0, "100 %"), (0.995, "100 %"), (0.0123, "1.2 %")])
+@pytest.mark.parametrize(("share", "words"), [(1.0, "100 %"), (0.995, "100 %"), (0.0996, "10 %"), (0.0123, "1.2 %")])
 def test_a_share_is_written_without_exponent(share, words):
     view = SimpleNamespace(fallen=[SimpleNamespace(effect="gyro_scale", share=share)])
     assert f", {words} of its sigma" in parts.largest(view)
+
+
+def test_candidates_that_noise_reaches_are_not_said_to_be_missing():
+    told = words(Page(record_of(Now(diagnosis=replace(MISFIT, standing=1)))).ask()["candidates"]["children"])
+    assert "gyro_scale_asymmetry_y" in told
+    assert "gyro_bias_step_y" not in told
+    shown = Page(record_of(Now(diagnosis=replace(MISFIT, standing=0)))).ask()
+    assert words(shown["candidates"]["children"]) == (
+        "Nothing stands out: noise reaches 3.82, and the score of no candidate is larger."
+    )
+    # Whoever wants to try one can.
+    assert shown["candidate"]["options"][0]["value"] == "gyro_scale_asymmetry_y"
+
+
+def test_numbers_of_the_page_have_one_sign_of_minus():
+    ranking = (("gyro_bias_step_y(t0=-3 s)", "-12.1 sigma, \N{MINUS SIGN}3 deg/h"),)
+    seen = replace(MISFIT, sentence="gyro_bias_y (-3.0 +- 0.2 deg/h) may be missing.", ranking=ranking, standing=1)
+    choices = [SeenChoice("X -180 deg: a", 0.3, 50.0), SeenChoice("Y -90 deg: b", 0.8, 1.61)]
+    shown = Page(record_of(Now(diagnosis=seen, choices=choices))).ask()
+    told = [words(shown[part]["children"]) for part in ("candidates", "choices", "verdict")]
+    # A label is what a command takes: it stays as it is typed.
+    told.append(shown["candidate"]["options"][0]["label"])
+    for text in told:
+        assert "-" not in text.replace("t0=-3 s", ""), text
+        assert "\N{MINUS SIGN}" in text

@@ -14,6 +14,7 @@ from sdimu_calibration.report.groups import title
 from sdimu_calibration.report.live_page.record import End, Head, LiveView, catalogue
 from sdimu_calibration.report.live_text import SeenChoice, SeenDiagnosis, SeenFamily
 from sdimu_calibration.report.markup import signs
+from sdimu_calibration.report.progress_text import short
 
 _LEAST, _MOST_FAMILIES = 0.05, 8
 """Probability (1) from which a family is listed, and how many are at most: less is one of many."""
@@ -64,14 +65,20 @@ def verdict(seen: SeenDiagnosis) -> tuple[str, str]:
 
 
 def candidates(seen: SeenDiagnosis) -> list[Any]:
-    """List what would explain the misfit: before the end by its score, then by its probability."""
+    """List what would explain the misfit: before the end by its score, then by its probability.
+
+    Before the end a candidate whose score noise reaches is not listed: it explains nothing.
+    """
     if seen.families or not math.isnan(seen.nothing):
         return _odds(seen)
     if not seen.ranking:
         return [html.P(NOT_YET, className="quiet")]
+    if not seen.standing:
+        words = f"Nothing stands out: {seen.reaches}, and the score of no candidate is larger."
+        return [html.P(words, className="quiet")]
     rows = [
-        html.Tr(html.Td([html.Button(label, className="row"), html.Span(score)]), **{"data-candidate": label})
-        for label, score in seen.ranking
+        html.Tr(html.Td([html.Button(label, className="row"), html.Span(signs(score))]), **{"data-candidate": label})
+        for label, score in seen.ranking[: seen.standing]
     ]
     return [
         html.P(f"Score and size of each alone; {seen.reaches}. Click one to choose it.", className="quiet"),
@@ -107,8 +114,8 @@ def choices(made: Sequence[SeenChoice]) -> list[Any]:
     if not made:
         return [html.P("This test follows a plan.", className="quiet")]
     *before, last = made
-    told = [html.P([html.B(f"{last.minutes:.1f} min "), last.text]), html.P(_worst(last), className="quiet")]
-    older = [html.Li(f"{one.minutes:.1f} min {one.text}") for one in reversed(before)][:_MOST_CHOICES]
+    told = [html.P([html.B(f"{last.minutes:.1f} min "), signs(last.text)]), html.P(_worst(last), className="quiet")]
+    older = [html.Li(f"{one.minutes:.1f} min {signs(one.text)}") for one in reversed(before)][:_MOST_CHOICES]
     return [*told, *([html.Details([html.Summary("Earlier turns"), html.Ul(older)])] if older else [])]
 
 
@@ -119,7 +126,7 @@ def _worst(choice: SeenChoice) -> str:
 def options(seen: SeenDiagnosis) -> list[dict[str, str]]:
     """Effects that may be added, the candidates first, with their scores."""
     ranked = dict(seen.ranking)
-    first = [{"label": f"{label}   {score}", "value": label} for label, score in ranked.items()]
+    first = [{"label": f"{label}   {signs(score)}", "value": label} for label, score in ranked.items()]
     return [*first, *({"label": name, "value": name} for name in catalogue() if name not in ranked)]
 
 
@@ -135,5 +142,4 @@ def largest(view: LiveView) -> str:
     if not view.fallen:
         return ""
     worst = view.fallen[0]
-    left = f"{100.0 * worst.share:.0f}" if worst.share > 0.1 else f"{100.0 * worst.share:.2g}"
-    return f"Known least: {title(worst.effect)}, {left} % of its sigma at the start is left."
+    return f"Known least: {title(worst.effect)}, {short(100.0 * worst.share)} % of its sigma at the start is left."
