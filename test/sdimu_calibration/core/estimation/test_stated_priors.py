@@ -76,8 +76,10 @@ def test_a_stated_prior_conditions_the_fit_of_the_other_coefficients(prepared, f
     ],
 )
 def test_a_prior_that_cannot_be_is_refused_by_name(prepared, prior, word):
-    with pytest.raises(DataError, match=word):
+    with pytest.raises(DataError, match=word) as caught:
         solve(prepared, replace(load_model("baseline"), priors=(prior,)))
+    # A key of a file says nothing to who states a prior on a page.
+    assert str(caught.value).startswith(f"prior of {prior.name}: ")
 
 
 def test_an_estimator_that_takes_no_prior_says_so(prepared):

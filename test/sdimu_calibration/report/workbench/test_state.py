@@ -16,7 +16,7 @@ from sdimu_calibration.report.workbench.own_effect import stated_priors
 from sdimu_calibration.report.workbench.parts import verdict
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State, from_json
-from sdimu_calibration.report.workbench.steps import _set_prior, step
+from sdimu_calibration.report.workbench.steps import step
 
 
 def test_undo_goes_back_through_every_step():
@@ -115,16 +115,37 @@ def test_numbers_of_many_stops_do_not_run_into_each_other():
 @pytest.mark.parametrize(
     ("mean", "sigma", "message"),
     [
-        ("", "5", "value of accel_bias_y: write a number with its unit"),
-        ("110 ug", "", "sigma of accel_bias_y: write a number with its unit"),
+        ("abc", "5", "value of accel_bias_y: 'abc' is not a number with a unit (expected something like '1 ug')"),
+        ("110 ug", "abc", "sigma of accel_bias_y: 'abc ug' is not a number with a unit (expected something like"),
+        ("", "5", "value of accel_bias_y: it is empty (write a number with its unit, such as '1 ug')"),
+        ("110 ug", "", "sigma of accel_bias_y: it is empty (write a number with its unit, such as '1 ug')"),
+        ("110", "5", "value of accel_bias_y: '110' has no unit (expected something like '110 ug')"),
+        ("110 deg/h", "5", "value of accel_bias_y: '110 deg/h' has the wrong unit (expected something like '1 ug')"),
+        ("110 ug", "-5", "sigma of accel_bias_y: '-5 ug' is below zero"),
     ],
 )
-def test_a_field_that_is_empty_is_named_as_people_call_it(mean, sigma, message):
+def test_a_wrong_prior_is_told_by_its_field_with_an_example_in_the_unit_of_the_coefficient(mean, sigma, message):
     controls = {"coefficient": "accel_bias_y", "mean": mean, "sigma": sigma}
-    with pytest.raises(DataError, match=message):
-        _set_prior(State(), controls)
+    wanted = step(State(), "set-prior", controls).now.priors
+    with pytest.raises(DataError) as caught:
+        stated_priors((), wanted, {"accel_bias_y": "ug"})
+    assert message in str(caught.value)
 
 
-def test_a_prior_without_a_unit_says_so():
-    with pytest.raises(DataError, match="prior of accel_bias_y: 'abc' and '5': write numbers with a unit"):
-        stated_priors((), [("accel_bias_y", "abc", "5")])
+def test_a_prior_of_a_coefficient_that_is_gone_is_told_by_name():
+    with pytest.raises(DataError, match="prior of bent: the model has no such coefficient"):
+        stated_priors((), [("bent", "1 ug", "1 ug")], {"accel_bias_y": "ug"})
+
+
+@pytest.mark.parametrize(
+    ("mean", "sigma", "read"),
+    [
+        ("110 ug", "5", ("110 ug", "5 ug")),
+        ("110ug", "5ug", ("110 ug", "5 ug")),
+        ("1.5e-3deg/h", "2e-4", ("1.5e-3 deg/h", "2e-4 deg/h")),
+        ("20%", "1 %", ("20 %", "1 %")),
+    ],
+)
+def test_a_unit_stands_behind_its_number_with_one_blank(mean, sigma, read):
+    controls = {"coefficient": "c", "mean": mean, "sigma": sigma}
+    assert step(State(), "set-prior", controls).now.priors == (("c", *read),)

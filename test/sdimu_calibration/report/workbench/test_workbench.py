@@ -198,6 +198,21 @@ def test_bad_effects_are_told_in_the_page_and_change_nothing(app, text, word):
     assert "\n" not in page.message
 
 
+@pytest.mark.parametrize(
+    ("coefficient", "mean", "message"),
+    [
+        ("accel_bias_y", "abc", "value of accel_bias_y: 'abc' is not a number with a unit (expected something like"),
+        ("gyro_bias_x", "", "value of gyro_bias_x: it is empty (write a number with its unit, such as '1 deg/h')"),
+        ("accel_misalignment_xy", "1 arcmin", "prior of accel_misalignment_xy: the body frame"),
+    ],
+)
+def test_a_wrong_prior_is_told_in_the_page_and_changes_nothing(app, coefficient, mean, message):
+    page = Page(app)
+    page.click("set-prior.n_clicks", coefficient_at_value=coefficient, mean_at_value=mean, sigma_at_value="5")
+    assert page.state is None
+    assert page.message.startswith(f"Not done: {message}")
+
+
 def test_undo_brings_the_misfit_back(app):
     page = Page(app)
     before = page.verdict

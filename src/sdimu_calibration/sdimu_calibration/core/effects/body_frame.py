@@ -361,7 +361,7 @@ def check_priors(stated: Sequence[str], names: Sequence[str], frame: str) -> Non
     """Refuse priors of coefficients that a body frame makes zero; `stated` are those whose prior a model states."""
     for name in set(stated) & set(pinned_in(names, frame)):
         raise DataError(
-            f"priors.{name}: the body frame of the accelerometers makes it zero by definition: leave the line out"
+            f"prior of {name}: the body frame of the accelerometers makes it zero by definition: state no prior of it"
         )
 
 

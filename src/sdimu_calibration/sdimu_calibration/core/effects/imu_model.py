@@ -178,14 +178,14 @@ def restate(sensors: ImuModel, priors: Sequence[StatedPrior]) -> ImuModel:
         if one.name not in sensors.names:
             near = difflib.get_close_matches(one.name, sensors.names, n=1)
             hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(sensors.names[:3])}, ..."
-            raise DataError(f"priors.{one.name}: the model has no such coefficient ({hint})")
+            raise DataError(f"prior of {one.name}: the model has no such coefficient ({hint})")
         k = sensors.names.index(one.name)
         unit = sensors.parameters[k].display_unit
-        _check_unit(f"priors.{one.name}", one.unit, unit)
+        _check_unit(f"prior of {one.name}", one.unit, unit)
         if not one.sigma >= 0.0 or not np.isfinite([one.mean, one.sigma]).all():
-            raise DataError(f"priors.{one.name}: expected a value, and a sigma above zero, or zero to fix it")
+            raise DataError(f"prior of {one.name}: expected a value, and a sigma above zero, or zero to fix it")
         if restated[k]:
-            raise DataError(f"priors.{one.name}: stands twice (state it once)")
+            raise DataError(f"prior of {one.name}: stands twice (state it once)")
         prior[k], mean[k], restated[k] = one.sigma, one.mean, True
     return replace(sensors, prior=prior, mean=mean, restated=restated)
 

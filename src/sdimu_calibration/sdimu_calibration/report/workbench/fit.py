@@ -21,6 +21,7 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.survey import survey
+from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
@@ -205,7 +206,11 @@ class FitSession:
 
     def _extended(self, setting: Setting) -> Model:
         model = with_effects(self.model, added_effects(self.model, setting.added, self.test.imu))
-        return replace(model, priors=stated_priors(self.model.priors, setting.priors))
+        if not setting.priors:
+            return model
+        sensors = imu_model.build(model.effects, self.test.imu)
+        units = {p.name: p.display_unit for p in sensors.parameters}
+        return replace(model, priors=stated_priors(self.model.priors, setting.priors, units))
 
     def _solved(self, setting: Setting, tell: Tell) -> Fit:
         if self._warm is not None and self._warm[0] == setting:

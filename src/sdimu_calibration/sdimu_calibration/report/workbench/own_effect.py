@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from sdimu_calibration.core.effect_key import parse_key
+from sdimu_calibration.core.effect_key import parse_key, read_quantity
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model, StatedPrior
-from sdimu_calibration.core.units import UnitError, parse_quantity
 from sdimu_calibration.report.workbench.setting import Prior
 from sdimu_calibration.storage.files.effect_file import find_effects, load_effect, new_parts
 
@@ -25,22 +24,33 @@ def added_effects(model: Model, added: Sequence[str], imu: ImuSpecification) -> 
     return tuple(effects[given:])
 
 
-def stated_priors(given: Sequence[StatedPrior], changed: Sequence[Prior]) -> tuple[StatedPrior, ...]:
+def stated_priors(
+    given: Sequence[StatedPrior], changed: Sequence[Prior], units: Mapping[str, str]
+) -> tuple[StatedPrior, ...]:
     """Put the priors of a page over those of the model that it started from.
 
-    `changed`: coefficient, mean and sigma as a page holds them.
+    `changed`: coefficient, mean and sigma as a page holds them; `units`: customary unit of each coefficient of the
+    model.
     """
     names = {name for name, _, _ in changed}
-    return (*(one for one in given if one.name not in names), *(_stated(*one) for one in changed))
+    return (*(one for one in given if one.name not in names), *(_stated(*one, units) for one in changed))
 
 
-def _stated(name: str, mean: str, sigma: str) -> StatedPrior:
-    try:
-        unit = sigma.partition(" ")[2].strip()
-        return StatedPrior(name, parse_quantity(mean, unit or "1"), parse_quantity(sigma, unit or "1"), unit)
-    except UnitError as error:
-        why = str(error) if unit else f"'{mean}' and '{sigma}': write numbers with a unit, as its row shows them"
-        raise DataError(f"prior of {name}: {why}") from error
+def _stated(name: str, mean: str, sigma: str, units: Mapping[str, str]) -> StatedPrior:
+    if name not in units:
+        raise DataError(f"prior of {name}: the model has no such coefficient (choose one of the table)")
+    unit = units[name]
+    value, spread = _field(f"value of {name}", mean, unit), _field(f"sigma of {name}", sigma, unit)
+    if spread < 0.0:
+        raise DataError(f"sigma of {name}: '{sigma}' is below zero (write a larger one; 0 fixes the coefficient)")
+    return StatedPrior(name, value, spread, unit)
+
+
+def _field(what: str, text: str, unit: str) -> float:
+    """Read a field of a prior (SI); what it says of a wrong one has an example in the unit of the coefficient."""
+    if not text.strip():
+        raise DataError(f"{what}: it is empty (write a number with its unit, such as '1 {unit}')")
+    return read_quantity(what, text, unit)
 
 
 def read_effect(text: str) -> tuple[Effect, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -70,7 +71,7 @@ def _spans(points: Any) -> list[tuple[float, float]]:
 
 def _fix(now: State, controls: Controls) -> State:
     mean = _quantity(controls, "mean")
-    return now.then(now.now.with_prior(_coefficient(controls), mean, f"0 {mean.partition(' ')[2]}"))
+    return now.then(now.now.with_prior(_coefficient(controls), mean, f"0 {mean.partition(' ')[2]}".strip()))
 
 
 def _set_prior(now: State, controls: Controls) -> State:
@@ -88,24 +89,19 @@ def _coefficient(controls: Controls) -> str:
     return str(controls["coefficient"])
 
 
-_FIELDS = {"mean": "value", "sigma": "sigma"}
-"""What people call the fields of a prior."""
+_BEFORE_UNIT = re.compile(r"(?<=[\d.])(?=[A-Za-z%](?![-+]?\d))")
+"""Between a number and the unit that touches it; an ``e`` before digits is an exponent."""
 
 
 def _quantity(controls: Controls, name: str) -> str:
-    """Text of a quantity, with one blank before its unit."""
-    text = " ".join(str(controls[name] or "").split())
-    if not text:
-        raise DataError(
-            f"{_FIELDS[name]} of {_coefficient(controls)}: write a number with its unit, as its row shows it"
-        )
-    return text
+    """Text of a quantity, with one blank before its unit; an empty one is told when the model reads it."""
+    return " ".join(_BEFORE_UNIT.sub(" ", str(controls[name] or "")).split())
 
 
 def _sigma(controls: Controls, mean: str) -> str:
     """Text of a sigma; a bare number has the unit of the value."""
     text = _quantity(controls, "sigma")
-    return text if " " in text else f"{text} {mean.partition(' ')[2]}".strip()
+    return text if " " in text or not text else f"{text} {mean.partition(' ')[2]}".strip()
 
 
 def _open(now: State, controls: Controls) -> State:
