@@ -53,9 +53,10 @@ def test_a_second_run_into_the_same_folder_is_refused_in_one_line(invoke, tmp_pa
         (("--tell", "gyro_bias_x"), "--tell: "),
         (("--adaptive", "table33", "--tell", "gyro_bias_x"), "two coefficients or more"),
         (("--plan", "kim18", "--adaptive", "table33"), "state one"),
+        (("--effect", "gyro_bias_warm_up_y=3 deg/h"), "such as 'gyro_bias_warm_up_y(tau=1200 s)=3 deg/h'"),
     ],
 )
-def test_options_that_exclude_each_other_are_refused(invoke, options, words):
+def test_options_that_exclude_or_lack_each_other_are_refused(invoke, options, words):
     refused = invoke(*options).exception
     assert isinstance(refused, DataError)
     assert words in str(refused)

@@ -12,7 +12,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_metadata import custom_data
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
-from sdimu_sim.cli.options import mount_rad
+from sdimu_sim.cli.options import World, mount_rad
 from sdimu_sim.cli.simulate import simulate
 from sdimu_sim.core import Scenario, generate
 
@@ -61,6 +61,23 @@ def test_the_mount_is_taken_in_degrees(run, tmp_path):
 def test_a_mount_that_is_not_three_angles_is_refused(text):
     with pytest.raises(DataError, match=r"three .*angles"):
         mount_rad(text)
+
+
+@pytest.mark.parametrize(
+    ("effect", "options", "example"),
+    [
+        ("gyro_bias_warm_up_y=0.03 deg/h", "tau", "gyro_bias_warm_up_y(tau=1200 s)=0.03 deg/h"),
+        ("accel_play_x", "r", "accel_play_x(r=0.3 g)=1 ug"),
+        ("gyro_lost_data=10 ms", "turn and at", "gyro_lost_data(turn=1, at=120 s)=10 ms"),
+    ],
+)
+def test_an_option_that_is_left_out_is_named_with_that_of_the_catalogue(run, tmp_path, effect, options, example):
+    with pytest.raises(DataError) as caught:
+        run("--effect", effect)
+    assert str(caught.value).endswith(f": state {options}, such as '{example}' (as in the catalogue)")
+    assert not (tmp_path / "bag").exists()
+    # The example is one that is read.
+    assert World(effect=[example]).effects == (example,)
 
 
 def test_an_unknown_effect_leaves_no_bag(run, tmp_path):

@@ -28,6 +28,7 @@ from sdimu_calibration.cli.serving import LivePage, PageOptions, ended
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import put_aside, same_file, written_together
 from sdimu_sim.cli.options import SeedOption, World
+from sdimu_sim.cli.usual_options import check_stated
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -103,6 +104,7 @@ def run(
 
     _check_choosing(test)
     page.check()
+    check_stated(world.effect or ())
     options = _parameters(test, world, out)
     duration = _check(options)
     if test.adaptive is not None:

@@ -15,6 +15,7 @@ from sdimu_calibration.cli.options import ReplaceOption
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effect_key import read_quantity
 from sdimu_sim.cli.options import PlanOption, SeedOption, World
+from sdimu_sim.cli.usual_options import check_stated
 
 if TYPE_CHECKING:
     from sdimu_sim.core.by_hand import ByHand
@@ -89,6 +90,7 @@ def simulate(
     truth_path = kept.truth or usual_truth(out)
     check_room(out, kept.replace)
     check_truth_room(truth_path, out, kept.replace)
+    check_stated(world.effect or ())
     if by_hand is not None:
         from sdimu_calibration.storage.files.config import load_imu, load_site
         from sdimu_sim.core.by_hand import ByHand
