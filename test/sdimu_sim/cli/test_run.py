@@ -1,6 +1,8 @@
 """The verb run: what it refuses, and that a refused run leaves everything as it was."""
 
+import math
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,11 +12,21 @@ from typer.testing import CliRunner
 from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.processes import own_domain, own_folder
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.diagnosis.advice import Untestable
+from sdimu_calibration.core.diagnosis.advice import Untestable, reason
+from sdimu_calibration.core.diagnosis.plan_seen import PlanSeen, TurnSeen
+from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_plan
 from sdimu_calibration.storage.files.journal import JOURNAL
 from sdimu_sim.cli.run import LiveTest, _clear, _tell_choices, _write_plan, run, without_scolding
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What of a diagnosis tells what to drive."""
+
+    advice: tuple[Advice, ...]
+    untestable: tuple[Untestable, ...]
 
 
 @pytest.fixture
@@ -133,12 +145,18 @@ def test_a_run_keeps_the_journal_of_a_live_test_and_removes_that_of_an_earlier_r
     assert not (tmp_path / JOURNAL).exists()
 
 
-def test_turns_that_the_test_chose_itself_are_not_scolded():
-    @dataclass(frozen=True)
-    class Summary:
-        advice: tuple[Advice, ...]
-        untestable: tuple[Untestable, ...]
+def test_no_reason_tells_a_test_that_chose_its_turns_what_to_drive():
+    plan = PlanSeen(tuple(TurnSeen(axis, axis, 1.6, 0.2, 0.2) for axis in range(3)), 0, 1.0)
+    families = [effect.family or effect.name for effect in map(registry.get, registry.names()) if effect.excitation]
+    seen = [SimpleNamespace(family=one, retention=0.0, smallest=math.inf, partners=()) for one in families]
+    reasons = {reason(one, plan) for one in seen}
+    told = without_scolding(Summary((), tuple(Untestable(one, ("a",)) for one in reasons)), "table33").untestable
+    asking = ("drive ", "needs turns", "split turns")
+    assert all(word in " ".join(reasons) for word in asking)
+    assert [one.reason for one in told if any(word in one.reason for word in asking)] == []
 
+
+def test_turns_that_the_test_chose_itself_are_not_scolded():
     kept = Advice(Kind.REPEAT_STOPS)
     told = Summary(
         (Advice(Kind.SIGNED_TURNS, ("all turns are positive",)), kept, Advice(Kind.TWO_RATES, ("one rate",))),

@@ -377,7 +377,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     return result
 
 
-_ABOUT_TURNS = ("all turns ", "every turn ")
+_ABOUT_TURNS = ("all turns ", "every turn ", "no stop lies ")
 """How reasons begin that end in what to drive."""
 
 
