@@ -369,6 +369,13 @@ def test_an_unknown_form_names_those_there_are(tmp_path: Path) -> None:
         export("excel", tmp_path / "x", result(*BASELINE), IMU)
 
 
-def test_a_form_that_cannot_be_says_what_to_do_instead(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"keep the calibration of the factory, .*sdimu compensate"):
-        export("xsens", tmp_path / "x", result(*BASELINE), IMU)
+@pytest.mark.parametrize("form", ["xsens", "Xsens"])
+def test_a_form_that_cannot_be_says_what_to_do_instead_and_where_it_is_explained(form: str, tmp_path: Path) -> None:
+    with pytest.raises(DataError) as caught:
+        export(form, tmp_path / "x", result(*BASELINE), IMU)
+    said = str(caught.value)
+    assert "keep the calibration of the factory" in said
+    assert said.endswith("(sdimu compensate; doc/using-the-result.md, Forms of export)")
+    page = Path(__file__).resolve().parents[4] / "doc" / "using-the-result.md"
+    told = page.read_text(encoding="utf-8").partition("\n## Forms of export\n")[2].partition("\n## ")[0]
+    assert "no form for Xsens" in told

@@ -51,10 +51,10 @@ FORMS = {
 
 
 _NO_FORM = {
-    "xsens": "units of Xsens keep the calibration of the factory, and take no other: compensate their samples on the "
-    "host (sdimu compensate; doc/using-the-result.md)"
+    "xsens": "units of Xsens keep the calibration of the factory, and no manual says how to write another: compensate "
+    "their samples on the host (sdimu compensate; doc/using-the-result.md, Forms of export)"
 }
-"""Why there is no form for what people ask for."""
+"""Why there is no form for what people ask for, by its name in small letters."""
 
 
 class Exported(NamedTuple):
@@ -94,7 +94,7 @@ def export(
         Asked of every file before the first is written: raises where one must not be.
     """
     if form not in FORMS:
-        why = _NO_FORM.get(form, f"expected one of {', '.join(FORMS)}")
+        why = _NO_FORM.get(form.lower(), f"expected one of {', '.join(FORMS)}")
         raise DataError(f"--format {form}: {why}")
     if path.is_dir():
         raise DataError(f"{path}: is a folder; name a file to write")
