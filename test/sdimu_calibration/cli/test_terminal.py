@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -202,7 +203,9 @@ def test_help_of_every_verb_fits_and_stands_in_the_order_of_work(sdimu):
 def test_advice_can_be_pasted(sdimu):
     said = sdimu("diagnose", "bag1", "--imu", "dtg", "--out", "pasted").stdout
     commands = [line.strip() for line in said.splitlines() if line.startswith("  sdimu ")]
-    assert commands
+    assert len(commands) == len(set(commands)) > 0
+    # Another test has left a plan here, and no verb replaces what it was not told to replace.
+    shutil.rmtree(sdimu.folder / "out" / "plan", ignore_errors=True)
     for line in commands:
         program, *arguments = shlex.split(line)
         assert program == "sdimu"
@@ -257,8 +260,8 @@ def test_advice_repeats_what_was_asked_for():
         "--tell",
         "b",
     ]
-    more = Advice(Kind.RECORD_ONCE_MORE, ("a", ("b",), "turn X"), Verb.CONTINUE)
-    assert sentence(more).endswith("turn X; for a whole plan: sdimu plan --after.")
+    more = Advice(Kind.PLAN_NEXT, (), Verb.CONTINUE)
+    assert sentence(more) == "A whole plan of the next recording, for all that is open: sdimu plan --after."
     assert spelled(more, asked) == "sdimu plan --after out"
     back = Advice(Kind.RUN_BACKWARDS, (), Verb.REVERSE_PLAN)
     assert sentence(back).endswith(f"The other order: sdimu plan --plan PLAN --backwards {stated}")

@@ -84,6 +84,7 @@ class Kind(StrEnum):
     """Label; what looks the same; turns in words."""
     NO_TURN_TELLS = auto()
     """Label; what looks the same; significance of the best turn, and that which tells (sigma)."""
+    PLAN_NEXT = auto()
 
     # About sets.
     REVERSE_AND_ADD = auto()

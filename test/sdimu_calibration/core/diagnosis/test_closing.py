@@ -34,8 +34,9 @@ def test_a_class_is_closed_by_a_turn_about_its_axis_at_another_rate(standing):
     assert {one.axis for one in turn.turns} == {"Y"}
     assert max(one.rate_rad_s for one in turn.turns) == pytest.approx(np.radians(10.0))
     assert turn.before < 3.0 < turn.after
-    (told,) = closing_advice([(members, turn)])
-    assert (told.kind, told.verb) == (Kind.RECORD_ONCE_MORE, Verb.CONTINUE)
+    told, plan = closing_advice([(members, turn)])
+    assert (told.kind, told.verb) == (Kind.RECORD_ONCE_MORE, None)
+    assert (plan.kind, plan.verb) == (Kind.PLAN_NEXT, Verb.CONTINUE)
     assert told.arguments == (OPEN[0], (OPEN[1],), turn.text)
 
 
@@ -44,7 +45,13 @@ def test_a_small_effect_is_told_apart_by_less(standing):
     (large,) = next_recording(standing, ASKED, SIZE)
     (small,) = next_recording(standing, ASKED, {name: 0.05 * size for name, size in SIZE.items()})
     assert small[1].after == pytest.approx(0.05 * large[1].after)
-    assert {one.kind for one in closing_advice([small])} == {Kind.NO_TURN_TELLS}
+    assert [one.kind for one in closing_advice([small])] == [Kind.NO_TURN_TELLS, Kind.PLAN_NEXT]
+
+
+def test_the_command_of_a_whole_plan_stands_once_for_all_classes(standing):
+    (one,) = next_recording(standing, ASKED, SIZE)
+    assert [told.verb for told in closing_advice([one, one])] == [None, None, Verb.CONTINUE]
+    assert closing_advice([]) == []
 
 
 def test_a_class_with_an_equation_is_passed_over(standing):

@@ -17,16 +17,16 @@ from sdimu_calibration.storage.files.advice_words import sentence
 @pytest.mark.parametrize(
     ("after", "begins"),
     [
-        (1.6, "No single turn tells a from b (the best one reaches 1.6 sigma, 3 are needed): search a whole plan"),
+        (1.6, "No single turn tells a from b (the best one reaches 1.6 sigma, 3 are needed)."),
         (4.0, "To tell a from b, record once more: rests of 100 s, and between them turn X +180 deg at 10 deg/s"),
     ],
     ids=["too little", "enough"],
 )
 def test_a_turn_is_advised_where_it_tells(after, begins):
     turn = NextTurn((Turn("X", math.pi, math.radians(10.0)),), 2.0, 1.5, after)
-    (told,) = _advice(Verdict.ONE_EFFECT, (), [(("a", "b"), turn)], ())
+    told, plan = _advice(Verdict.ONE_EFFECT, (), [(("a", "b"), turn)], ())
     assert sentence(told).startswith(begins)
-    assert sentence(told).endswith(": sdimu plan --after.")
+    assert sentence(plan).endswith(": sdimu plan --after.")
 
 
 @pytest.mark.parametrize(

@@ -63,14 +63,14 @@ def next_recording(standing: Standing, asked: Question, values: Mapping[str, flo
 
 
 def closing_advice(closing: Closing) -> list[Advice]:
-    """Advise the recording that closes each class, or a whole plan where no turn tells enough."""
+    """Advise the recording that closes each class, then a whole plan, which closes all that it can."""
     out = []
     for (label, *others), turn in closing:
         if turn.after < TELLS:
-            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, TELLS), Verb.CONTINUE))
+            out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, TELLS)))
         else:
-            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text), Verb.CONTINUE))
-    return out
+            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text)))
+    return [*out, Advice(Kind.PLAN_NEXT, (), Verb.CONTINUE)] if out else []
 
 
 def _sizes(standing: Standing, members: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:

@@ -196,13 +196,13 @@ _WORDS: dict[Kind, Callable[..., str]] = {
         f"No plan tells {label} from {other}: record at another temperature, or after another warm-up."
     ),
     Kind.RECORD_ONCE_MORE: lambda label, others, turns: (
-        f"To tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}; for a "
-        "whole plan"
+        f"To tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}."
     ),
     Kind.NO_TURN_TELLS: lambda label, others, best, tells: (
         f"No single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
-        "are needed): search a whole plan for the next recording"
+        "are needed)."
     ),
+    Kind.PLAN_NEXT: lambda: "A whole plan of the next recording, for all that is open",
     Kind.FIND_EFFECT: lambda: "Find which effect is missing",
     Kind.FIND_SMALLER: lambda: "Find out whether smaller effects are missing",
 }
