@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from sdimu_calibration.report.markup import signs
 from sdimu_calibration.storage.files.result_file import read_result
 
 from .conftest import DEADLINE_S, sdimu
@@ -110,7 +111,7 @@ def test_a_page_follows_a_run_to_its_end(tmp_path: Path, apart: int) -> None:
     assert f"{EFFECT} is in the model" in page.text("answer")
     assert read_result(out).names[-1] == EFFECT
     choices = json.loads((out / "choices.json").read_text())["choices"]
-    assert all(json.dumps(choice["text"]).strip('"') in page.text("choices") for choice in choices)
+    assert all(json.dumps(signs(choice["text"])).strip('"') in page.text("choices") for choice in choices)
     stops = page.shown["heat"]["figure"]["data"][0]["x"]
     turns = [choice["step"] for choice in choices if choice["step"] and choice["step"]["turn"]]
     assert len(stops) == 1 + len(turns)
