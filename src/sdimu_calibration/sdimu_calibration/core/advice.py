@@ -81,7 +81,7 @@ class Kind(StrEnum):
     NO_PLAN_TELLS = auto()
     """Label, and what no plan tells it from."""
     RECORD_ONCE_MORE = auto()
-    """Label; what looks the same; turns in words."""
+    """Label; what looks the same; length of the rests (s); turns in words."""
     NO_TURN_TELLS = auto()
     """Label; what looks the same; significance of the best turn, and that which tells (sigma)."""
     PLAN_NEXT = auto()

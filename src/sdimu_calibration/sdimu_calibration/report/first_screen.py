@@ -191,8 +191,8 @@ def _fit_figures(calibration: Calibration) -> tuple[tuple[str, str], ...]:
 
 def _stands_for_an_effect(calibration: Calibration) -> bool:
     """Whether noise was learned in the place of what is missing: in it everything is right, and nothing is."""
-    in_noise = (held_out_judged(calibration), nis_judged(calibration))
-    return bool(calibration.misfits) and noise_learned(calibration) and not max(in_noise) > MISFIT
+    right = all(not figure > MISFIT for figure in (held_out_judged(calibration), nis_judged(calibration)))
+    return bool(calibration.misfits) and noise_learned(calibration) and right
 
 
 def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:

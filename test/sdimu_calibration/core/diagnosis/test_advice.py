@@ -11,6 +11,7 @@ import pytest
 
 from sdimu_calibration.cli.next_commands import Asked, spelled
 from sdimu_calibration.core.advice import Advice, Kind
+from sdimu_calibration.core.diagnosis import advice as room
 from sdimu_calibration.core.diagnosis.advice import (
     _about_data,
     _at_stake,
@@ -34,6 +35,7 @@ from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.storage.files.advice_words import _SPOKEN, _WORDS, sentence
 from sdimu_calibration.storage.files.advice_words import lead as words_before_command
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.effect_file import find_effects
 
 MIX = """
@@ -197,3 +199,27 @@ def test_a_file_of_another_grade_is_the_first_advice_and_no_factor_is():
     # "gyro times 0.00" was advised where noise with a memory hides the white noise.
     (factor,) = (one for one in _about_data(d) if one.kind == Kind.CORRECT_NOISE)
     assert factor.arguments == (1.0, 4.8)
+
+
+@pytest.mark.parametrize(("after", "told"), [(2.9, []), (3.0, ["gyro_bias_ramp_y"])])
+def test_a_change_with_time_is_told_apart_by_a_stay_where_no_turn_tells_enough(monkeypatch, after, told):
+    every = [(("gyro_bias_ramp_y", "gyro_bias_wrap_yx"), SimpleNamespace(after=after))]
+    every += [(("gyro_scale_asymmetry_y", "gyro_scale_quadratic_y"), SimpleNamespace(after=0.1))]
+    monkeypatch.setattr(room, "next_recording", lambda *_: every)
+    monkeypatch.setattr(room, "standing", lambda *_: None)
+    every_one = [found(*split(resolve(members[0])), members[1:]) for members, _ in every]
+    site, imu, model = load_site("daejeon"), load_imu("dtg"), load_model("baseline")
+    d = SimpleNamespace(fit=SimpleNamespace(test=SimpleNamespace(site=site, imu=imu), model=model))
+    assert [members[0] for members, _ in room._closing(d, every_one)] == [*told, "gyro_scale_asymmetry_y"]
+    assert room._closing(d, [found(*split(resolve("gyro_bias_ramp_y")))]) == []
+    d.fit.test.site = None
+    assert room._closing(d, every_one) == []
+
+
+def test_what_only_a_change_of_temperature_tells_is_known_by_either_of_two():
+    (scale,) = split(resolve("accel_quadratic_x"))
+    (heat,) = split(resolve("accel_bias_temperature_x"))
+    assert room._hangs_on_heat(found(heat, ["accel_quadratic_x"]))
+    assert room._hangs_on_heat(found(scale, ["accel_bias_temperature_x"]))
+    assert not room._hangs_on_heat(found(scale, ["accel_cubic_x"]))
+    assert not room._hangs_on_heat(found(scale, ["accel_x: sin(3 fx)"]))

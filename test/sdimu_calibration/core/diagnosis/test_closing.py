@@ -37,7 +37,7 @@ def test_a_class_is_closed_by_a_turn_about_its_axis_at_another_rate(standing):
     told, plan = closing_advice([(members, turn)])
     assert (told.kind, told.verb) == (Kind.RECORD_ONCE_MORE, None)
     assert (plan.kind, plan.verb) == (Kind.PLAN_NEXT, Verb.CONTINUE)
-    assert told.arguments == (OPEN[0], (OPEN[1],), turn.text)
+    assert told.arguments == (OPEN[0], (OPEN[1],), 100.0, turn.text)
 
 
 def test_a_small_effect_is_told_apart_by_less(standing):

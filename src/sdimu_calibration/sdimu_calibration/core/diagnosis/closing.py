@@ -20,15 +20,12 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn
 from sdimu_calibration.core.recording import DataError
 
-REST_S = 100.0
+_REST_S = 100.0
 """Length of the rests of an advised recording (s): that of the plans, enough to level and to find north."""
 _ACCELERATION_RAD_S2 = math.radians(20.0)
 """Acceleration of its turns (rad/s^2): half a second to the fastest rate of `next_turn`."""
 TELLS = 3.0
 """Significance (sigma) from which effects are told apart: a turn that reaches less is no advice."""
-_MOST = 3
-"""Number of classes for which a turn is looked for (1): each takes half a second, and people read no more."""
-
 Closing = Sequence[tuple[tuple[str, ...], NextTurn]]
 """Members of each open class, and the turn that tells most of it a minute."""
 
@@ -48,9 +45,9 @@ def next_recording(standing: Standing, asked: Question, values: Mapping[str, flo
     sequence of (tuple of str, NextTurn)
         Of a class that holds what no plan can foresee, such as an equation, none.
     """
-    stay = Plan("next", (REST_S,), (), _ACCELERATION_RAD_S2)
+    stay = Plan("next", (_REST_S,), (), _ACCELERATION_RAD_S2)
     found = []
-    for members in standing.open[:_MOST]:
+    for members in standing.open:
         try:
             have = {label for e in asked.model.effects for label in selection.resolve(e).labels}
             added = [label for label in standing.added if label not in have and label not in members]
@@ -69,7 +66,7 @@ def closing_advice(closing: Closing) -> list[Advice]:
         if turn.after < TELLS:
             out.append(Advice(Kind.NO_TURN_TELLS, (label, tuple(others), turn.after, TELLS)))
         else:
-            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), turn.text)))
+            out.append(Advice(Kind.RECORD_ONCE_MORE, (label, tuple(others), _REST_S, turn.text)))
     return [*out, Advice(Kind.PLAN_NEXT, (), Verb.CONTINUE)] if out else []
 
 

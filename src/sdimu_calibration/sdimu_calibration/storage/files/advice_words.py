@@ -195,8 +195,8 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.NO_PLAN_TELLS: lambda label, other: (
         f"No plan tells {label} from {other}: record at another temperature, or after another warm-up."
     ),
-    Kind.RECORD_ONCE_MORE: lambda label, others, turns: (
-        f"To tell {label} from {', '.join(others)}, record once more: rests of 100 s, and between them {turns}."
+    Kind.RECORD_ONCE_MORE: lambda label, others, rest, turns: (
+        f"To tell {label} from {', '.join(others)}, record once more: rests of {rest:.0f} s, and between them {turns}."
     ),
     Kind.NO_TURN_TELLS: lambda label, others, best, tells: (
         f"No single turn tells {label} from {', '.join(others)} (the best one reaches {best:.1f} sigma, {tells:.0f} "
