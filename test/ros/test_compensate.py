@@ -27,13 +27,12 @@ from sdimu_calibration.storage.bags.cdr import encode_imu
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.result_file import write_result
 
-from .conftest import FitSession
+from .conftest import DEADLINE_S, FitSession
 
 pytestmark = pytest.mark.ros
 
 INTERVAL_NS = 10_000_000
 START_NS = 1_700_000_000 * 10**9
-PATIENCE_S = 200.0
 
 
 def drawn(seed: int, *more: str, **data: float) -> Calibration:
@@ -80,7 +79,7 @@ class Rig:
     def spin_until(self, condition, what: str) -> None:
         begun = time.monotonic()
         while not condition():
-            assert time.monotonic() - begun < PATIENCE_S, what
+            assert time.monotonic() - begun < DEADLINE_S, what
             self.executor.spin_until_future_complete(Future(), 0.02)
 
     def call(self, client, request):

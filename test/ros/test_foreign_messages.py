@@ -63,7 +63,7 @@ def test_foreign_units_and_stamps_give_the_same_digits_live_and_from_the_bag(ben
     )
     bench.children.start("calibration", CALIBRATION, {"out": str(bench.folder), "site": "daejeon"})
     bench.children.start("replay", REPLAY, {"bag": str(bench.folder / "driver"), "consumers": 2})
-    bench.wait_for_end(120.0)
+    bench.wait_for_end()
     np.testing.assert_array_equal(imu_stamps(bag), stamps)
     live = read_result(bench.folder / "result.json")
     process = sdimu("calibrate", bag, "--site", "daejeon", "--out", bench.folder / "offline")
@@ -105,5 +105,5 @@ def test_a_unit_or_sign_that_is_none_is_refused_as_by_the_command_line(
             return True
 
     bench.children.start("calibration", CALIBRATION, {"out": str(bench.folder)} | parameter)
-    bench.wait(failed, "failure", 60.0)
+    bench.wait(failed, "failure")
     assert words in complaints[0]

@@ -31,7 +31,9 @@ class Page:
 
     def is_there(self) -> bool:
         try:
-            self._callbacks = json.load(urllib.request.urlopen(f"{self._address}_dash-dependencies", timeout=20))
+            self._callbacks = json.load(
+                urllib.request.urlopen(f"{self._address}_dash-dependencies", timeout=DEADLINE_S)
+            )
         except OSError:
             return False
         return True
@@ -63,7 +65,7 @@ class Page:
         asked = urllib.request.Request(
             f"{self._address}_dash-update-component", json.dumps(body).encode(), {"Content-Type": "application/json"}
         )
-        answer: dict[str, Any] = json.load(urllib.request.urlopen(asked, timeout=60))["response"]
+        answer: dict[str, Any] = json.load(urllib.request.urlopen(asked, timeout=DEADLINE_S))["response"]
         return answer
 
 
@@ -102,7 +104,7 @@ def test_a_page_follows_a_run_to_its_end(tmp_path: Path, apart: int) -> None:
                 added = True
             assert time.monotonic() - begun < DEADLINE_S
             time.sleep(0.5)
-        said, err = run.communicate(timeout=60)
+        said, err = run.communicate(timeout=DEADLINE_S)
     finally:
         run.kill()
     assert run.returncode in {0, 3}, err

@@ -55,14 +55,14 @@ def test_a_driver_of_best_effort_with_jitter_and_without_phases_is_calibrated(be
         publisher = node.create_publisher(Imu, "/my_imu/data", SENSOR_DATA)
         log = bench.folder / "log" / "calibration.log"
         bench.wait(lambda: "best effort only" in log.read_text(encoding="utf-8"), "the fall back to best effort")
-        bench.wait(publisher.get_subscription_count, "a subscriber", 10.0)
+        bench.wait(publisher.get_subscription_count, "a subscriber")
         time.sleep(1.0)
         for k in range(0, len(sent), BATCH):
             for message in sent[k : k + BATCH]:
                 publisher.publish(message)
             time.sleep(PAUSE_S)
         client = node.create_client(Trigger, "/calibration/save")
-        bench.wait(client.service_is_ready, "the service", 10.0)
+        bench.wait(client.service_is_ready, "the service")
         time.sleep(2.0)
         future: Future = client.call_async(Trigger.Request())
         executor.spin_until_future_complete(future, DEADLINE_S)

@@ -22,7 +22,7 @@ from trajectory_msgs.msg import JointTrajectory
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY, header, to_ns
 
-from .conftest import FitSession, write_plan
+from .conftest import DEADLINE_S, FitSession, write_plan
 
 pytestmark = pytest.mark.ros
 
@@ -120,10 +120,10 @@ def drive(bench: FitSession, **more: object) -> None:
     bench.children.run("table_goals", GOALS, ["--ros-args", *words])
 
 
-def spin_to_end(bench: FitSession, controller: Controller, deadline_s: float = 60.0) -> None:
+def spin_to_end(bench: FitSession, controller: Controller) -> None:
     begun = time.monotonic()
     while bench.children.running():
-        assert time.monotonic() - begun < deadline_s
+        assert time.monotonic() - begun < DEADLINE_S
         controller.spin(0.05)
 
 

@@ -128,7 +128,7 @@ def test_a_run_whose_calibration_dies_ends_with_one_line(tmp_path: Path) -> None
     plan = write_plan(tmp_path / "plan.yaml", 60.0)
     process = sdimu("run", "--plan", plan, "--speed", 5, "--out", tmp_path / "run")
     parent = psutil.Process(process.pid)
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + DEADLINE_S
     victim = None
     while victim is None and time.monotonic() < deadline:
         # The interpreter of the venv may start itself again before it is the node.

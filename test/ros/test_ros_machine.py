@@ -23,13 +23,12 @@ import pytest
 from sdimu_calibration.cli.processes import own_domain
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import write_plan
+from .conftest import DEADLINE_S, write_plan
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOLS = "SDIMU_ROS2"
 SYSTEM = ("numpy==1.26.4", "scipy==1.11.4", "PyYAML==6.0.1")
 """What rosdep installs on Ubuntu 24.04; numpy 1.26 has no wheel for Python 3.13 and later."""
-DEADLINE_S = 400.0
 QUESTION = "std_msgs/msg/String"
 """Type of the table's question: `ros2 topic echo` then needs not wait until it has found the publisher."""
 PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "doc").glob("*.md")))
@@ -221,10 +220,10 @@ def ros2(machine: RosMachine, tools: Path, tmp_path: Path, monkeypatch: pytest.M
             command("daemon stop")
 
 
-def wait(condition: Callable[[], object], what: str, deadline_s: float = DEADLINE_S) -> None:
+def wait(condition: Callable[[], object], what: str) -> None:
     begun = time.monotonic()
     while not condition():
-        assert time.monotonic() - begun < deadline_s, f"{what}: not within {deadline_s} s"
+        assert time.monotonic() - begun < DEADLINE_S, f"{what}: not within {DEADLINE_S} s"
         time.sleep(0.2)
 
 

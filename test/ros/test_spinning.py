@@ -9,6 +9,8 @@ import pytest
 
 from sdimu_calibration.storage.bags.recover import recover
 
+from .conftest import DEADLINE_S
+
 pytestmark = pytest.mark.ros
 
 SHELL = """
@@ -54,7 +56,7 @@ run_node(full, ["--ros-args", "-p", f"out:={sys.argv[1]}"])
 
 def run(code, *arguments):
     command = [sys.executable, "-c", code, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
 
 
 def test_a_full_disk_on_the_way_out_is_one_line():

@@ -20,7 +20,7 @@ from sdimu_calibration.nodes.credits import HISTORY, LATCHED, STREAM, header
 from sdimu_calibration.storage.bags.cdr import encode_imu, encode_status
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import CALIBRATION, FitSession
+from .conftest import CALIBRATION, DEADLINE_S, FitSession
 
 pytestmark = pytest.mark.ros
 
@@ -69,9 +69,9 @@ class Driver:
 
     def call(self, service: str) -> Trigger.Response:
         client = self.node.create_client(Trigger, f"/calibration/{service}")
-        assert client.wait_for_service(20.0)
+        assert client.wait_for_service(DEADLINE_S)
         future = client.call_async(Trigger.Request())
-        self.executor.spin_until_future_complete(future, 60.0)
+        self.executor.spin_until_future_complete(future, DEADLINE_S)
         return future.result()
 
 
@@ -103,7 +103,7 @@ def test_a_node_that_stays_takes_what_comes_after_an_end_and_begins_anew_on_requ
         for first, expected in ((0, 4000), (40, 8000)):
             driver.send(first, 40)
             driver.tell_end(first + 40)
-            bench.wait(lambda expected=expected: samples_in(bench.folder) == expected, f"result of {expected}", 120.0)
+            bench.wait(lambda expected=expected: samples_in(bench.folder) == expected, f"result of {expected}")
             assert bench.children.running()
             assert journal.exists() == checkpoint
         assert driver.call("save").success
@@ -111,7 +111,7 @@ def test_a_node_that_stays_takes_what_comes_after_an_end_and_begins_anew_on_requ
         assert driver.call("reset").success
         driver.send(0, 50)
         driver.tell_end(50)
-        bench.wait(lambda: samples_in(bench.folder) == 5000, "result after the reset", 120.0)
+        bench.wait(lambda: samples_in(bench.folder) == 5000, "result after the reset")
         assert bench.children.running()
     finally:
         driver.close()
@@ -130,9 +130,9 @@ def test_samples_that_come_after_the_end_was_given_up_are_in_the_result(bench: F
         driver.wait_for_listeners()
         driver.send(0, 40)
         driver.tell_end(60)
-        bench.wait(lambda: samples_in(bench.folder) == 4000, "result without the end", 120.0)
+        bench.wait(lambda: samples_in(bench.folder) == 4000, "result without the end")
         driver.send(40, 20)
-        bench.wait(lambda: samples_in(bench.folder) == 6000, "result with what came late", 120.0)
+        bench.wait(lambda: samples_in(bench.folder) == 6000, "result with what came late")
         assert bench.children.running()
     finally:
         driver.close()

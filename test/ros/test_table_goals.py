@@ -28,7 +28,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, header, to_ns
 from sdimu_calibration.storage.files.result_file import read_result
 
-from .conftest import RATE_HZ, FitSession, imu_stamps, write_plan
+from .conftest import DEADLINE_S, RATE_HZ, FitSession, imu_stamps, write_plan
 
 pytestmark = pytest.mark.ros
 
@@ -68,10 +68,10 @@ class Person:
         values = {v.key: v.value for v in m.status[0].values}
         self.phases.append((to_ns(m.header.stamp), values["phase"], values["stop"]))
 
-    def until(self, condition: Any, what: str, deadline_s: float = 60.0) -> None:
+    def until(self, condition: Any, what: str) -> None:
         begun = time.monotonic()
         while not condition():
-            assert time.monotonic() - begun < deadline_s, f"{what}: {self.goals[-3:]}, {self.joints[-1:]}"
+            assert time.monotonic() - begun < DEADLINE_S, f"{what}: {self.goals[-3:]}, {self.joints[-1:]}"
             self._executor.spin_until_future_complete(Future(), 0.02)
 
     def call(self, kind: type, name: str, request: Any) -> Any:
@@ -172,7 +172,7 @@ def test_goals_are_carried_out_refused_replaced_held_and_stopped(bench: FitSessi
     assert "call the service resume first" in person.told("refused", "too early")
     person.trigger("resume")
     person.trigger("finish")
-    bench.wait_for_end(30.0)
+    bench.wait_for_end()
     rates = np.array([rate for _, _, rate in person.joints])
     assert np.abs(rates).max() < 100.0 * DEG
 
@@ -211,7 +211,7 @@ def test_nothing_moves_unless_it_is_allowed_and_a_person_is_asked(bench: FitSess
     driving = {"plan": str(bench.plan), "table": "ideal"}
     bench.children.start("table_goals", GOALS, driving)
     with pytest.raises(DataError, match="nothing moves while the parameter allow_motion is false"):
-        bench.wait_for_end(60.0)
+        bench.wait_for_end()
     bench.children.start("table_goals", GOALS, driving | {"allow_motion": True, "ask": True})
     person.until(lambda: "Y +90 deg at 30 deg/s" in person.question, "the question")
     time.sleep(0.5)
@@ -222,7 +222,7 @@ def test_nothing_moves_unless_it_is_allowed_and_a_person_is_asked(bench: FitSess
     np.testing.assert_allclose(person.angles, [90.0, 0.0, 0.0], atol=1e-9)
     person.call(SetBool, "table_goals/confirm", SetBool.Request(data=False))
     with pytest.raises(DataError, match="a person said no"):
-        bench.wait_for_end(60.0)
+        bench.wait_for_end()
     np.testing.assert_allclose(person.angles, [90.0, 0.0, 0.0], atol=1e-9)
 
 
@@ -237,7 +237,7 @@ def test_motion_that_is_forbidden_on_the_way_comes_to_rest(bench: FitSession, pe
     done = client.set_parameters([Parameter("allow_motion", value=False)])
     person.until(done.done, "the answer")
     with pytest.raises(DataError, match="allow_motion was set to false"):
-        bench.wait_for_end(60.0)
+        bench.wait_for_end()
     person.until(lambda: not any(person.joints[-1][2]), "rest")
     assert 20.0 < person.angles[0] < 170.0
 
@@ -268,7 +268,7 @@ def test_a_node_killed_in_a_turn_leaves_no_result_and_says_so(bench: FitSession,
     bench.children.kill(victim)
     if victim == "table_goals":
         # The table comes to the end of its move and stands there; a successor goes on from there.
-        person.until(lambda: person.goals and person.goals[-1][0] == "reached", "the end of the move", 90.0)
+        person.until(lambda: person.goals and person.goals[-1][0] == "reached", "the end of the move")
         np.testing.assert_allclose(person.angles, [90.0, 0.0, 0.0], atol=1e-9)
         assert person.phases[-1][1:] == ("dwell", "1")
         bench.children.start("table_goals", GOALS, driving)

@@ -35,25 +35,27 @@ RESULT = Calibration(
 def of(used, *refused):
     """A result of some recordings; the refused ones by their names."""
     told = tuple((name, "no samples") for name in refused)
-    return replace(RESULT, of_set=SimpleNamespace(recordings=(None,) * used, left_out=told))
+    return replace(RESULT, of_set=SetSummary((None,) * used, (), (), np.array([1.0]), (), told))
 
 
 @pytest.mark.parametrize(
-    ("file", "refused", "title"),
+    ("file", "result", "title"),
     [
-        (None, (), "Diagnosis of 2 recordings"),
-        (None, ("c.mcap",), "Diagnosis of 2 of 3 recordings"),
-        (Path("set.yaml"), (), "Diagnosis of set.yaml"),
-        (Path("set.yaml"), ("c.mcap",), "Diagnosis of set.yaml (2 of 3 recordings)"),
+        (None, of(2), "Diagnosis of 2 recordings"),
+        (None, of(2, "c.mcap"), "Diagnosis of 2 of 3 recordings"),
+        (None, of(1), "Diagnosis of 1 recording"),
+        (Path("set.yaml"), of(2), "Diagnosis of set.yaml"),
+        (Path("set.yaml"), of(2, "c.mcap"), "Diagnosis of set.yaml (2 of 3 recordings)"),
     ],
 )
-def test_a_title_counts_what_was_used(file, refused, title):
-    assert page_title(SimpleNamespace(file=file), "Diagnosis", of(2, *refused)) == title
+def test_a_title_counts_what_was_used(file, result, title):
+    assert page_title(SimpleNamespace(file=file), "Diagnosis", result) == title
 
 
 def test_the_table_names_what_was_refused():
     assert table_heading(of(2, "c.mcap")).startswith("2 of 3 recordings together, without c.mcap,")
     assert table_heading(of(2)).startswith("2 recordings together, body frame")
+    assert table_heading(of(1)).startswith("1 recording, body frame")
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.set_verdict import SetFinding
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration, SetSummary
+from sdimu_calibration.core.results import Calibration, SetSummary, of_recordings
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.storage.bags.file_room import results_folder
@@ -104,18 +104,18 @@ class JointFit(Fitted):
     @property
     def of_set(self) -> SetSummary:
         """Recordings, what differs from power-on to power-on, and what the coefficients follow."""
-        return _summary(self.result)
+        return of_recordings(self.result)
 
     @property
     def _heading(self) -> str:
-        return f"{len(self.core.reports)} recordings together, body frame: {self.result.body_frame}"
+        return f"{self.of_set.together}, body frame: {self.result.body_frame}"
 
     def save(self, folder: str | Path) -> Path:
         """Write result.json and report.html into a folder, as `sdimu calibrate` does."""
         folder = results_folder(folder)
         with written_together(folder) as part:
             write_result(part / "result.json", self.result)
-            write_report(part / "report.html", self.result, title=f"Calibration of {len(self.of)} recordings")
+            write_report(part / "report.html", self.result, title=f"Calibration of {self.of_set.counted}")
         return folder
 
 
@@ -168,18 +168,12 @@ class JointDiagnosis(Diagnosed):
     def save(self, folder: str | Path) -> Path:
         """Write set.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
         folder = results_folder(folder)
-        title = f"Diagnosis of {len(self.of)} recordings"
+        title = f"Diagnosis of {of_recordings(self.result).counted}"
         with written_together(folder) as part:
             write_set_diagnosis(part / "set.json", self.core)
             write_result(part / "result.json", self.result, self.core.verdict)
             write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder
-
-
-def _summary(result: Calibration) -> SetSummary:
-    if result.of_set is None:
-        raise AssertionError("the result of a set says what it is of")
-    return result.of_set
 
 
 def _of_unit(result: Calibration, of: OpenedSet) -> Calibration:

@@ -18,6 +18,7 @@ from sdimu_calibration.cli.opened import folder_for_result, leave, printing, tel
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.core.note import MISFITS, topic_of, without_advice
+from sdimu_calibration.core.results import of_recordings
 from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
@@ -206,26 +207,16 @@ def _trace(asked: SetRequest) -> Trace:
 
 def page_title(asked: SetRequest, word: str, result: Calibration) -> str:
     """Say of how many recordings a page is, or of which set file; where some were refused, of how many of them."""
-    counted = f"{count_in_words(result)} recordings"
+    of_set = of_recordings(result)
     if asked.file is None:
-        return f"{word} of {counted}"
-    some = f" ({counted})" if result.of_set and result.of_set.left_out else ""
+        return f"{word} of {of_set.counted}"
+    some = f" ({of_set.counted})" if of_set.left_out else ""
     return f"{word} of {asked.file.name}{some}"
 
 
 def table_heading(result: Calibration) -> str:
     """Say what a table of coefficients is of, and which recordings could not be used."""
-    refused = ", ".join(name for name, _ in result.of_set.left_out) if result.of_set else ""
-    without = f", without {refused}" if refused else ""
-    return f"{count_in_words(result)} recordings together{without}, body frame: {result.body_frame}"
-
-
-def count_in_words(result: Calibration) -> str:
-    """Count the recordings of a joint result: ``3``, or ``2 of 3`` where one was left out."""
-    if result.of_set is None:
-        return "0"
-    used, refused = len(result.of_set.recordings), len(result.of_set.left_out)
-    return f"{used} of {used + refused}" if refused else f"{used}"
+    return f"{of_recordings(result).together}, body frame: {result.body_frame}"
 
 
 def _with_serial(result: Calibration, members: Sequence[Member]) -> Calibration:

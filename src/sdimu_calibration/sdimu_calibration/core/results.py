@@ -11,6 +11,7 @@ from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import MISFITS, Topic, topic_of
 from sdimu_calibration.core.origin import Origin
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
@@ -158,6 +159,18 @@ class SetSummary:
     left_out: tuple[tuple[str, str], ...] = ()
     """Recordings that could not be used, and why."""
 
+    @property
+    def counted(self) -> str:
+        """How many recordings these are: ``1 recording``, ``3 recordings``, ``2 of 3 recordings``."""
+        used, refused = len(self.recordings), len(self.left_out)
+        return f"{used} of {used + refused} recordings" if refused else counted(used, "recording")
+
+    @property
+    def together(self) -> str:
+        """The same as the heading of a table: ``3 recordings together, without far``."""
+        some = f"{self.counted} together" if len(self.recordings) > 1 else self.counted
+        return ", without ".join([some, *([", ".join(name for name, _ in self.left_out)] if self.left_out else [])])
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -259,3 +272,10 @@ class Calibration:
 
     def _about(self, *topics: Topic) -> tuple[str, ...]:
         return tuple(line for line in self.warnings if topic_of(line) in topics)
+
+
+def of_recordings(result: Calibration) -> SetSummary:
+    """Give what the result of a joint fit says beyond the coefficients."""
+    if result.of_set is None:
+        raise AssertionError("the result of a set says what it is of")
+    return result.of_set

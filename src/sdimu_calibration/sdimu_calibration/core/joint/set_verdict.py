@@ -79,6 +79,11 @@ class SetFacts:
     back), or did not come to an end."""
 
     @property
+    def are_several(self) -> bool:
+        """Whether the set has more than one recording."""
+        return len(self.fit.reports) > 1
+
+    @property
     def beside_function(self) -> bool:
         """Whether an unknown function of the attitude explains what is left."""
         return self.fit.function is not None
@@ -138,7 +143,8 @@ def _found(word: Verdict, facts: SetFacts) -> str:
     if word == Verdict.CONSISTENT:
         how = "nothing stands out of the noise" if facts.again is None else "each in a noise of its own"
         mark = ":" if facts.again is None else ","
-        return f"The model explains all recordings together{mark} {how}{nothing_missing(told)}."
+        what = "all recordings together" if facts.are_several else "the recording"
+        return f"The model explains {what}{mark} {how}{nothing_missing(told)}."
     if word in {Verdict.DATA_FAULT, Verdict.UNEXPLAINED}:
         names = " and ".join(map(_named, findings[:LISTED]))
         names += f" and {len(findings) - LISTED} more" if len(findings) > LISTED else ""
@@ -150,7 +156,8 @@ def _found(word: Verdict, facts: SetFacts) -> str:
         most = f" Found beside it: {in_grades(list(map(_graded, findings)))}" if findings else ""
         odd = "" if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
-        what = "The recordings share something" if shared else "Something differs between the recordings"
+        of_several = "The recordings share something" if shared else "Something differs between the recordings"
+        what = of_several if facts.are_several else "The recording shows something"
         return f"{what} that no effect of the catalogue explains.{most}{odd}"
     return in_grades(list(map(_graded, findings)))
 
