@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +19,10 @@ import pytest
 from numpydoc.docscrape import NumpyDocString, Parameter
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "doc" / "extensions"))
+
+from constants_page import numeric_constants  # noqa: E402 (an extension of the book is on no path)
+
 SOURCE = ROOT / "src" / "sdimu_calibration" / "sdimu_calibration"
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|NDArray|Stamps)\b")
 FLOATING = re.compile(r"\b(Floats|NDArray\[np\.float64\])")
@@ -175,27 +180,6 @@ def array_fields(node: ast.ClassDef) -> dict[str, str]:
     return {n: a for n, a in written.items() if ARRAY.search(a) and not n.startswith("_") and "Callable" not in a}
 
 
-def constants(path: Path) -> Iterator[tuple[str, str]]:
-    """Numeric constants of a module and the docstring after each."""
-    body = ast.parse(path.read_text()).body
-    for node, after in zip(body, [*body[1:], None], strict=True):
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value and is_numeric(node.value):
-            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
-            said = after.value if isinstance(after, ast.Expr) else None
-            yield ast.unparse(target), str(said.value) if isinstance(said, ast.Constant) else ""
-
-
-def is_numeric(value: ast.expr) -> bool:
-    """A number, a formula or an array of numbers; not a row of indices that names columns."""
-    if isinstance(value, ast.Call) and not ast.unparse(value.func).startswith(("np.", "math.")):
-        return False
-    if not isinstance(value, ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple | ast.Call):
-        return False
-    parts = [part.value for part in ast.walk(value) if isinstance(part, ast.Constant)]
-    indices = isinstance(value, ast.Tuple) and all(isinstance(part, int) for part in parts)
-    return bool(parts) and not indices and all(isinstance(part, int | float) for part in parts)
-
-
 def faults_of_constant(doc: str) -> Iterator[str]:
     """What is missing: quantity and unit (or that it is a pure number) before the colon, the reason after it."""
     quantity, _, reason = doc.partition(":")
@@ -209,7 +193,7 @@ def faults_of_constant(doc: str) -> Iterator[str]:
 
 def faults_of(path: Path) -> list[str]:
     found = [f"{one.name}: {fault}" for one in public(path) for fault in faults(one)]
-    return found + [f"{name}: {fault}" for name, doc in constants(path) for fault in faults_of_constant(doc)]
+    return found + [f"{name}: {fault}" for name, _, doc in numeric_constants(path) for fault in faults_of_constant(doc)]
 
 
 @pytest.mark.parametrize("module", sorted(modules()))

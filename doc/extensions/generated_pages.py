@@ -1,4 +1,4 @@
-"""What is made at each build, below doc/generated: the command line, the catalogue, the signature of every effect."""
+"""What is made at each build, below doc/generated: command line, constants, catalogue, signature of every effect."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from command_line import page
+from constants_page import page as constants
 
+import sdimu_calibration
 from sdimu_calibration.report.catalogue import page as catalogue
 
 HEADING = re.compile(r"^### (\w+)\n", re.MULTILINE)
@@ -28,10 +30,11 @@ def write(path: Path, text: str) -> None:
 
 
 def make(app: Any) -> None:
-    """Make the pages of the command line and of the catalogue, and the figures."""
+    """Make the pages of the command line, the catalogue and the constants, and the figures."""
     folder = Path(app.srcdir) / "generated"
     write(folder / "cli.md", page())
     write(folder / "effects.md", catalogue(typeset=True))
+    write(folder / "constants.md", constants(Path(sdimu_calibration.__file__).parent))
     program = Path(__file__).with_name("signature_figures.py")
     # The compiler is switched off in this process, and the figures need what it compiles.
     kept = {name: value for name, value in os.environ.items() if name != "NUMBA_DISABLE_JIT"}
