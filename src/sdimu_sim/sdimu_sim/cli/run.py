@@ -377,10 +377,6 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     return result
 
 
-_ABOUT_TURNS = ("all turns ", "every turn ", "no stop lies ")
-"""How reasons begin that end in what to drive."""
-
-
 def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisSummary:
     """Leave out advice to drive other turns where the test itself chose them: its goals ask for what they show.
 
@@ -393,10 +389,7 @@ def without_scolding(summary: DiagnosisSummary, goals: str | None) -> DiagnosisS
     if goals is None:
         return summary
     about_turns = {Kind.SIGNED_TURNS, Kind.TWO_RATES}
-    unseen = tuple(
-        replace(one, reason=one.reason.partition(": ")[0]) if one.reason.startswith(_ABOUT_TURNS) else one
-        for one in summary.untestable
-    )
+    unseen = tuple(replace(one, because=one.because._replace(drive="")) for one in summary.untestable)
     advice = tuple(one for one in summary.advice if one.kind not in about_turns)
     return replace(summary, advice=advice, untestable=unseen)
 

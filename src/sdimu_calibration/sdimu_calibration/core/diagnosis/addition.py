@@ -175,4 +175,4 @@ def _why(evidence: LinearEvidence, column: int) -> str:
         testable=False,
         partners=("model",),
     )
-    return reason(size, plan_seen(evidence))
+    return reason(size, plan_seen(evidence)).text

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,13 +43,30 @@ _MOST_STAKES = 3
 """Number of coefficients at stake that one advice names: diagnosis.json has the rest."""
 
 
+class Reason(NamedTuple):
+    """Why a test does not show an effect."""
+
+    why: str
+    drive: str = ""
+    """What to drive that shows it; empty where no turn does."""
+
+    @property
+    def text(self) -> str:
+        """Both, as people read them."""
+        return f"{self.why}: {self.drive}" if self.drive else self.why
+
+
 @dataclass(frozen=True)
 class Untestable:
     """Effects that could not have been seen, all for one reason."""
 
-    reason: str
-    """Why not, and what would show them."""
+    because: Reason
     labels: tuple[str, ...]
+
+    @property
+    def reason(self) -> str:
+        """Why not, and what would show them."""
+        return self.because.text
 
 
 def untestable_reasons(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> tuple[Untestable, ...]:
@@ -58,16 +76,16 @@ def untestable_reasons(reached: tuple[DetectableSize, ...], plan: PlanSeen) -> t
 
 def untestable_by_hand(reached: tuple[DetectableSize, ...]) -> tuple[Untestable, ...]:
     """Sort what a run by hand does not show by the reason; the largest groups first."""
-    return _sorted(reached, lambda one: _TOO_SMALL if _shows(one) else NOT_BY_HAND)
+    return _sorted(reached, lambda one: Reason(_TOO_SMALL if _shows(one) else NOT_BY_HAND))
 
 
-def _sorted(reached: tuple[DetectableSize, ...], why: Callable[[DetectableSize], str]) -> tuple[Untestable, ...]:
-    groups: dict[str, list[str]] = {}
+def _sorted(reached: tuple[DetectableSize, ...], why: Callable[[DetectableSize], Reason]) -> tuple[Untestable, ...]:
+    groups: dict[Reason, list[str]] = {}
     for one in reached:
         if not one.testable:
             groups.setdefault(why(one), []).append(one.label)
     ordered = sorted(groups.items(), key=lambda item: -len(item[1]))
-    return tuple(Untestable(text, tuple(labels)) for text, labels in ordered)
+    return tuple(Untestable(because, tuple(labels)) for because, labels in ordered)
 
 
 def _shows(one: DetectableSize) -> bool:
@@ -75,25 +93,25 @@ def _shows(one: DetectableSize) -> bool:
     return one.retention > TESTABLE and bool(np.isfinite(one.smallest))
 
 
-def reason(one: DetectableSize, plan: PlanSeen) -> str:
+def reason(one: DetectableSize, plan: PlanSeen) -> Reason:
     """Say why a candidate is not testable with this plan."""
     effect = registry.find(one.family)
     needed = effect.excitation if effect else frozenset()
     if effect and effect.never_seen:
-        return effect.never_seen
+        return Reason(effect.never_seen)
     if Excitation.BOTH_SENSES in needed and plan.one_sided():
-        return f"{_senses(plan)}: drive some negative (the second turn of each 180 deg pair costs nothing)"
+        return Reason(_senses(plan), "drive some negative (the second turn of each 180 deg pair costs nothing)")
     if Excitation.TWO_RATES in needed and plan.one_rate():
-        return f"{_rates(plan)}: drive every other turn at another rate, such as 2 and 10 deg/s"
+        return Reason(_rates(plan), "drive every other turn at another rate, such as 2 and 10 deg/s")
     if Excitation.TWO_AXES in needed:
-        return "every turn is about one body axis: needs turns about two at once"
+        return Reason("every turn is about one body axis", "needs turns about two at once")
     if Excitation.OBLIQUE_STOPS in needed and not plan.oblique:
-        return "no stop lies between the body axes: split turns of 90 deg into halves of 45 deg"
+        return Reason("no stop lies between the body axes", "split turns of 90 deg into halves of 45 deg")
     if _shows(one):
-        return _TOO_SMALL
+        return Reason(_TOO_SMALL)
     if one.partners:
-        return "coefficients of the model take it"
-    return "the motion of this test does not excite it"
+        return Reason("coefficients of the model take it")
+    return Reason("the motion of this test does not excite it")
 
 
 def advice(
