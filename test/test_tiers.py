@@ -96,9 +96,20 @@ def test_make_test_holds_style_types_and_tests():
     assert '-m "not thorough and not slow and not bench"' in make.split("\ntest-run: setup\n")[1].partition("\n\n")[0]
 
 
-def test_thorough_makes_both_of_its_parts():
-    make = (ROOT / "Makefile").read_text().split("\nthorough: setup\n")[1].partition("\n\n")[0]
-    assert make.endswith(" thorough-nodes thorough-rest")
+def test_thorough_makes_all_of_its_parts():
+    make = (ROOT / "Makefile").read_text()
+    assert (
+        make.split("\nthorough: setup\n")[1].partition("\n\n")[0].endswith(" thorough-nodes thorough-rest other-blas")
+    )
+    # What one part leaves out for its kernels of linear algebra is what the other runs, long tests too.
+    assert (
+        make.split("\nthorough-rest: setup\n")[1].partition("\n\n")[0].endswith(" $(addprefix --ignore=,$(NUMERICAL))")
+    )
+    assert (
+        make.split("\nother-blas: setup\n")[1]
+        .partition("\n\n")[0]
+        .endswith('-m "not slow and not bench" $(NUMERICAL) $(NUMERICAL_LIVE)')
+    )
 
 
 def test_every_mutant_is_one_place_of_the_core():
