@@ -100,7 +100,9 @@ def test_a_recording_that_cannot_be_read_is_left_out_and_told(options):
     assert [name for name, _ in fit.left_out] == ["bad"]
     result = set_outcome(fit)
     assert any("bad is left out: no samples" in note for note in result.notes)
-    with pytest.raises(DataError, match=r"only one of 2 recordings can be used, and a set needs two \(bad is left out"):
+    with pytest.raises(
+        DataError, match=r"only one of 2 recordings can be used: mend or omit the others \(bad is left out"
+    ):
         fit_set((some.members[0], Member("bad", broken)), options, here)
 
 

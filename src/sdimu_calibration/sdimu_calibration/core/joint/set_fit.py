@@ -207,7 +207,7 @@ def fit_set(
             break
     if left and len(fit.reports) < 2:
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
-        raise DataError(f"only one of {len(members)} recordings can be used, and a set needs two ({why})")
+        raise DataError(f"only one of {len(members)} recordings can be used: mend or omit the others ({why})")
     fit = _in_shared_scatter(fit, options, run)
     late = {name: r for name, r in late.items() if name not in left}
     fit = _noise_of(late, fit, options, run) if late else fit

@@ -68,7 +68,10 @@ _SUFFIXES = (".yaml", ".yml", ".json")
 class Schema(BaseModel):
     """Base of every file schema: no unknown keys, no infinities."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, protected_namespaces=(), defer_build=True)
+    # Built at the first file that is read: to build all of them takes each command .1 s.
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, frozen=True, protected_namespaces=(), defer_build=True
+    )
 
     @field_validator("*", mode="before")
     @classmethod

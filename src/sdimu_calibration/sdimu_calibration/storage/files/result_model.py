@@ -34,7 +34,9 @@ _NAN = float("nan")
 class ResultModel(BaseModel):
     """Base of models of result files: keys that a file of others has beyond ours are passed over."""
 
-    model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True, protected_namespaces=(), populate_by_name=True, defer_build=True)
+    model_config = ConfigDict(
+        frozen=True, arbitrary_types_allowed=True, protected_namespaces=(), populate_by_name=True, defer_build=True
+    )
 
     def plain(self) -> dict[str, Any]:
         """Give what was set as plain data, in the order of the fields."""
