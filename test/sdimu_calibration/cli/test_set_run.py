@@ -75,12 +75,22 @@ def test_what_is_advised_repeats_all_that_was_asked(bags, file, of_what):
 
 @pytest.mark.parametrize(("names", "said"), [(("day1", "day2"), "day1, day2<"), ("abcdef", "a, b, c, d and others<")])
 def test_the_page_says_beside_its_title_which_recordings_it_is_of(names, said):
+    assert f'<span class="about grow">{said}' in page(recorded(names), Contents("x"))
+
+
+def test_the_page_of_one_recording_does_not_compare_it_with_itself():
+    heading = "Every coefficient in every recording"
+    assert heading in page(recorded(("day1", "day2")), Contents("x"))
+    assert heading not in page(recorded(("day1",)), Contents("x"))
+
+
+def recorded(names):
+    """The result of a set of recordings of these names."""
     value = np.array([1e-4])
     parts = tuple(
         SetRecording(name, "", "", 0, np.nan, 60.0, 6000.0, 1.0, value, 0.1 * value, 0.0 * value) for name in names
     )
-    told = replace(RESULT, of_set=replace(RESULT.of_set, recordings=parts))
-    assert f'<span class="about grow">{said}' in page(told, Contents("x"))
+    return replace(RESULT, of_set=replace(RESULT.of_set, recordings=parts))
 
 
 def test_the_page_names_it_above_the_table():

@@ -26,7 +26,8 @@ def set_sections(calibration: Calibration, of_set: SetSummary, draw: Draw) -> li
     """List the recordings, what differs between them, and what it follows."""
     return [
         _recordings(of_set),
-        _deviates(calibration, of_set, draw),
+        # Nothing deviates from the only one.
+        *([_deviates(calibration, of_set, draw)] if len(of_set.recordings) > 1 else []),
         *_turn_on(calibration, of_set),
         *_trends(calibration, of_set),
     ]
