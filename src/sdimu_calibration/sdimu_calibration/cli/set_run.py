@@ -18,7 +18,6 @@ from sdimu_calibration.cli.opened import folder_for_result, leave, printing, tel
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.core.note import MISFITS, topic_of, without_advice
-from sdimu_calibration.core.results import of_recordings
 from sdimu_calibration.storage.files.whole_file import written_together
 
 if TYPE_CHECKING:
@@ -207,6 +206,8 @@ def _trace(asked: SetRequest) -> Trace:
 
 def page_title(asked: SetRequest, word: str, result: Calibration) -> str:
     """Say of how many recordings a page is, or of which set file; where some were refused, of how many of them."""
+    from sdimu_calibration.core.results import of_recordings
+
     of_set = of_recordings(result)
     if asked.file is None:
         return f"{word} of {of_set.counted}"
@@ -216,6 +217,8 @@ def page_title(asked: SetRequest, word: str, result: Calibration) -> str:
 
 def table_heading(result: Calibration) -> str:
     """Say what a table of coefficients is of, and which recordings could not be used."""
+    from sdimu_calibration.core.results import of_recordings
+
     return f"{of_recordings(result).together}, body frame: {result.body_frame}"
 
 

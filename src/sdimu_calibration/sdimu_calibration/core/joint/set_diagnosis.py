@@ -65,15 +65,14 @@ class SetDiagnosis:
     recurrence: Recurrence | None
     """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     refused: tuple[SetFinding, ...] = ()
-    """Effects that were found and taken back: recordings held out fit worse with them, or an unknown function of the
-    attitude explains them."""
+    """Effects that were found and taken back, as an unknown function of the attitude explains them."""
     error_without: float | None = None
     """Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
     them. By itself that model learns in each recording what it lacks as noise, and its own error hides it."""
     probabilities: Probabilities | None = None
     """Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
-    function of the attitude explains what is left or an effect was taken back, which the search did not know, and where
-    the search did not come to an end."""
+    function of the attitude explains what is left, which the search did not know, and where the search did not come to
+    an end."""
     unknown: tuple[UnknownFunction, ...] = ()
     """The function of the attitude that explains what is left, at all stops; empty without one."""
 
@@ -98,22 +97,13 @@ def diagnose_set(
     word = verdict_of_set(facts)
     refused: tuple[SetFinding, ...] = ()
     why = "" if found.stood else f"{TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}."
-    if word == Verdict.UNEXPLAINED and found.chosen and _rises(before, after):
-        # What imitates the missing cause fits here and fails elsewhere: the coefficients are better without.
-        refused = tuple(f for f in facts.findings if not f.recording)
-        why = f"{_fits_worse(refused, before, after)} {why}".strip()
-        found = taken_back(found, options, run, [f.label for f in refused])
-        after = set_outcome(found.after) if found.local else before
-        again = recurrence(leftovers(found.after, run))
-        # What was found is taken back, and something is missing all the same: the verdict stays.
-        facts = SetFacts(_findings(found), after, found.after, again, None)
     # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
     shared = again is not None and not again.answer and not facts.is_of_some
     asked = again is not None and (shared or ATTITUDE in again.answer)
     beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
     if again is not None and beside.gain > _SHARED:
         found, beside, needed_not = _beside_function(found, beside, again, options, run)
-        refused += tuple(f for f in facts.findings if f.tag in needed_not)
+        refused = tuple(f for f in facts.findings if f.tag in needed_not)
         why = f"{_explained(again, needed_not)} {why}".strip()
         facts = SetFacts(_findings(found), set_outcome(found.after), found.after, again, None)
         word = verdict_of_set(facts)
@@ -223,24 +213,6 @@ def _differences(fit: SetFit) -> tuple[Floats, Floats]:
     """
     T = differences(fit.names)
     return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
-
-
-def _fits_worse(findings: Sequence[SetFinding], before: Calibration, after: Calibration) -> str:
-    names = ", ".join(f.label for f in findings[:LISTED]) + (", ..." if len(findings) > LISTED else "")
-    return (
-        f"The model stays as given: with {names} the error at recordings held out, each model in the noise that it "
-        f"leaves, rises from {_rms(before)} to {_rms(after)}."
-    )
-
-
-def _rises(before: Calibration, after: Calibration) -> bool:
-    """Whether recordings held out fit worse with what was found, by more than a sentence rounds away."""
-    one, two = before.fit["held_out_rms"], after.fit["held_out_rms"]
-    return one is not None and two is not None and round(two, 3) > round(one, 3)
-
-
-def _rms(result: Calibration) -> str:
-    return f"{result.fit['held_out_rms']:.3f}"
 
 
 def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:
