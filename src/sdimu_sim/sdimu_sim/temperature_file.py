@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import ABSOLUTE_ZERO_DEGC, UnitError, parse_quantity
-from sdimu_calibration.storage.files.config import Schema, find_config, quantity, read_yaml
+from sdimu_calibration.storage.files.config import Schema, find_config, read_yaml
+from sdimu_calibration.storage.files.quantities import quantity
 from sdimu_sim.core.temperature import TemperatureProfile
 
 ROOM_DEGC = 25.0

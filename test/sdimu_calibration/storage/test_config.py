@@ -93,12 +93,20 @@ def test_a_site_without_format_or_azimuth_is_enough(tmp_path):
         ("gravity_sigma", "gravity_sigma_m_s2", "100 mgal", 1e-3),
         ("gravity_sigma", "gravity_sigma_m_s2", "30 ug", 30e-6 * 9.80665),
         ("gravity_sigma", "gravity_sigma_m_s2", "1e-4 m/s^2", 1e-4),
+        ("gravity_sigma", "gravity_sigma_m_s2", "formula", 4.2e-4),
+        ("deflection_sigma", "deflection_sigma_rad", "10 arcsec", 4.8481e-5),
+        ("deflection_sigma", "deflection_sigma_rad", "formula", 4.8481e-5),
+        ("deflection_sigma", "deflection_sigma_rad", "map", 6.3026e-6),
+        ("latitude_sigma", "latitude_sigma_rad", "surveyed", 1.74533e-8),
+        ("latitude_sigma", "latitude_sigma_rad", "map", 1.74533e-5),
+        ("gravity_m_s2: 9.8\ngravity_sigma", "gravity_sigma_m_s2", "map", 5e-5),
+        ("gravity_m_s2: 9.8\ngravity_sigma", "gravity_sigma_m_s2", "surveyed", 1e-6),
     ],
 )
 def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected):
     plain = load_site(written(tmp_path, SITE))
     assert getattr(plain, name) == 0.0
-    assert getattr(load_site(written(tmp_path, SITE + f"{key}: {text}\n")), name) == pytest.approx(expected)
+    assert getattr(load_site(written(tmp_path, SITE + f"{key}: {text}\n")), name) == pytest.approx(expected, 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -109,6 +117,36 @@ def test_a_site_states_how_well_it_is_known(tmp_path, key, name, text, expected)
         ("site", "height_m: 0", "height_m: 0\nlatitude_sigma: 0.1", "latitude_sigma: '0.1' has no unit"),
         ("site", "height_m: 0", "height_m: 0\nlatitude_sigma: 9 deg", "'9 deg' is no sigma from 0 to 2 deg"),
         ("site", "height_m: 0", "height_m: 0\ngravity_sigma: -1 mgal", "'-1 mgal' is no sigma from 0 to 5000 mgal"),
+        (
+            "site",
+            "height_m: 0",
+            "height_m: 0\nlatitude_sigma: formula",
+            "latitude_sigma: 'formula' is no sigma .expected surveyed or map, or something like '1 deg'",
+        ),
+        (
+            "site",
+            "height_m: 0",
+            "height_m: 0\ngravity_sigma: gravimeter",
+            "gravity_sigma: 'gravimeter' is no sigma .expected surveyed, map or formula, or something like '1 mgal'",
+        ),
+        (
+            "site",
+            "height_m: 0",
+            "height_m: 0\ngravity_sigma: map",
+            "gravity_sigma: 'map' says how gravity_m_s2 was found: state that, too, or write 'formula'",
+        ),
+        (
+            "site",
+            "height_m: 0",
+            "height_m: 0\ndeflection_sigma: surveyed",
+            "deflection_sigma: .*expected map or formula",
+        ),
+        (
+            "site",
+            "height_m: 0",
+            "height_m: 0\ndeflection_sigma: 10 arcmin",
+            "'10 arcmin' is no sigma from 0 to 360 arcsec",
+        ),
         ("plan", "dwell: 100 s", "dwell: 100", "dwell: '100' has no unit"),
         ("plan", "axis: Y", "axis: Q", r"turns\.0\.axis: .*'X', 'Y' or 'Z'"),
         ("plan", "angle: 90 deg", "angel: 90 deg", r"turns\.0\.ang"),

@@ -36,6 +36,20 @@ class Site:
     gravity_sigma_m_s2: float = 0.0
     """`latitude_sigma_rad`, `gravity_sigma_m_s2`: standard deviation of latitude and gravity as they are told; zero
     takes them at their word."""
+    deflection_sigma_rad: float = 0.0
+    """Standard deviation of the deflection of the vertical in the meridian: astronomic less geodetic latitude."""
+
+    @property
+    def astronomic_latitude_sigma_rad(self) -> float:
+        """Standard deviation of the latitude as the plumb line has it: the Earth's rate is seen against that."""
+        return float(np.hypot(self.latitude_sigma_rad, self.deflection_sigma_rad))
+
+    @property
+    def sigmas(self) -> dict[str, float]:
+        """Sigmas (rad, m/s^2) by their keys in a file, those that are zero left out."""
+        own = self.latitude_sigma_rad, self.deflection_sigma_rad, self.gravity_sigma_m_s2
+        keys = "latitude_sigma", "deflection_sigma", "gravity_sigma"
+        return {key: sigma for key, sigma in zip(keys, own, strict=True) if sigma}
 
 
 @dataclass(frozen=True)

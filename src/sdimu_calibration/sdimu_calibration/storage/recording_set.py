@@ -21,8 +21,9 @@ from sdimu_calibration.core.wording import Work
 from sdimu_calibration.storage.bags.bag_folder import FileState, file_states
 from sdimu_calibration.storage.bags.bag_metadata import METADATA, custom_data, read_metadata
 from sdimu_calibration.storage.bags.file_room import check_file_room
-from sdimu_calibration.storage.files.config import Schema, find_config, load_imu, quantity, read_yaml
+from sdimu_calibration.storage.files.config import Schema, find_config, load_imu, read_yaml
 from sdimu_calibration.storage.files.model_choice import HANDHELD, named_estimator, named_model
+from sdimu_calibration.storage.files.quantities import quantity
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,13 +13,14 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.found import found_effects
-from sdimu_calibration.core.effects.references import stated_references
+from sdimu_calibration.core.effects.references import stated_references, told_of
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import fit_about, solve
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.joint.combine import Combination, Rows
 from sdimu_calibration.core.joint.reduction import reduced
+from sdimu_calibration.core.joint.set_order import check_one_site
 from sdimu_calibration.core.live import LiveCalibration
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.site_reference import relative_line
@@ -32,6 +34,8 @@ from sdimu_study.score import baseline_z
 
 SEED = 131
 LATITUDE, GRAVITY = float(np.radians(0.5)), to_si(100.0, "mgal")
+DEFLECTION = to_si(6.0, "arcmin")
+"""More than there is on Earth: the DTG sees a latitude to about an arcminute."""
 SCALES = ("accel_scale_x", "accel_scale_y", "accel_scale_z")
 
 
@@ -40,10 +44,10 @@ IMU, MODEL, SITE = load_imu("dtg"), load_model("baseline"), Site(float(np.radian
 
 
 @cache
-def recorded(effects=()):
+def recorded(effects=(), site=SITE):
     plan = load_plan("kim18_signed")
     plan = replace(plan, dwell_s=(60.0,) * len(plan.dwell_s))
-    return generate(Scenario(plan, IMU, SITE, rate_hz=20.0, seed=SEED, effects=effects))
+    return generate(Scenario(plan, IMU, site, rate_hz=20.0, seed=SEED, effects=effects))
 
 
 def off(**sigmas):
@@ -55,6 +59,16 @@ def off(**sigmas):
 @cache
 def fitted(estimator="filter", effects=()):
     return solve(PreparedTest(recorded(effects)[0], IMU, off(**SIGMAS)), MODEL, estimator)
+
+
+@cache
+def under_a_deflection(sigma):
+    """A test whose plumb line lies `DEFLECTION` north of the latitude that is told, calibrated with that sigma."""
+    gravity = float(earth.normal_gravity(SITE.latitude_rad, SITE.height_m))
+    true = replace(SITE, latitude_rad=SITE.latitude_rad + DEFLECTION, gravity_m_s2=gravity)
+    recording, truth = recorded(site=true)
+    site = replace(SITE, deflection_sigma_rad=sigma)
+    return outcome(solve(PreparedTest(recording, IMU, site), MODEL, "filter"), held_out=False), truth.imu
 
 
 @cache
@@ -104,7 +118,32 @@ def test_a_site_at_its_word_says_what_is_relative_to_it():
     assert not any("was estimated, too" in note for note in result.notes)
     line = relative_line(result.references)
     assert "accel_scale_x, accel_scale_y, accel_scale_z to gravity 9.798288 m/s^2 (WGS-84" in line
+    # The root of 1795 mgal^2, and over 979829 mgal.
+    assert line.endswith("usually off by 42 mgal, 43 ppm of them: state gravity_m_s2, or gravity_sigma: formula")
     assert "\n" not in line
+
+
+def test_a_stated_gravity_is_not_said_to_be_that_of_a_formula():
+    line = relative_line(told_of(replace(SITE, gravity_m_s2=9.8), SCALES))
+    assert line == f"sigmas are relative to the site as told: {', '.join(SCALES)} to gravity 9.800000 m/s^2"
+
+
+def test_a_deflection_of_the_vertical_is_found_as_the_latitude_of_the_plumb_line():
+    (found, truth), (at_word, _) = under_a_deflection(DEFLECTION), under_a_deflection(0.0)
+    latitude, gravity = found.references
+    off = latitude.value - latitude.told - DEFLECTION
+    assert abs(off) < 4.0 * latitude.value_sigma < DEFLECTION
+    assert latitude.sigma == DEFLECTION
+    (note,) = (note for note in found.notes if "was estimated, too" in note)
+    assert "latitude 36.4000 deg (geodetic, found with the deflection of the vertical)" in note
+    assert "from +- 6 arcmin" in note
+    # 27 errors over sigma; with the latitude at its word the Earth's rate that is missing goes into the gyros.
+    assert np.sqrt(np.mean(baseline_z(found, truth) ** 2)) < 1.45
+    assert np.abs(baseline_z(at_word, truth)).max() > np.abs(baseline_z(found, truth)).max() + 1.0
+    # Gravity of the formula is that of the ellipsoid: the plumb line has no part in it.
+    assert gravity.value_sigma == 0.0
+    rows = [found.names.index(name) for name in SCALES]
+    assert np.diag(found.covariance)[rows] == pytest.approx(np.diag(at_word.covariance)[rows], rel=0.02)
 
 
 def test_what_is_found_of_the_site_stands_in_the_result_and_its_file(tmp_path):
@@ -136,6 +175,25 @@ def test_gravity_by_a_latitude_is_as_uncertain_as_that():
     assert np.allclose(slope[np.abs(down) > 0.1], 5.16e-2 * np.sin(2.0 * SITE.latitude_rad), rtol=1e-2)
 
 
+def test_gravity_goes_with_the_geodetic_part_of_a_latitude_alone():
+    seen = at_its_word().known.seen
+    down = seen.C_nb[:, 2, :]
+
+    def slope_of(effect):
+        return float(np.median((effect.regressors(seen)[:, 3:] / down)[np.abs(down) > 0.1]))
+
+    ((whole, _),) = stated_references(replace(SITE, latitude_sigma_rad=3e-4))
+    both = replace(SITE, latitude_sigma_rad=3e-4, deflection_sigma_rad=4e-4)
+    (latitude, sigma), (gravity, left) = stated_references(both)
+    assert (sigma, gravity.name) == (pytest.approx(5e-4), "reference_gravity")
+    # Covariance of gravity with the sum is that with the geodetic part, its variance what that part alone gives.
+    assert slope_of(latitude) * 25.0 == pytest.approx(slope_of(whole) * 9.0)
+    assert (slope_of(latitude) * 5e-4) ** 2 + left**2 == pytest.approx((slope_of(whole) * 3e-4) ** 2)
+    ((alone, size),) = stated_references(replace(SITE, deflection_sigma_rad=4e-4))
+    assert ([term.channel for term in alone.terms], size) == ([0, 1, 2], 4e-4)
+    assert [size for _, size in stated_references(replace(both, gravity_m_s2=9.8))] == [pytest.approx(5e-4)]
+
+
 def test_the_classical_estimator_says_that_it_takes_the_site_at_its_word():
     test = PreparedTest(recorded()[0], IMU, off(**SIGMAS))
     with pytest.raises(DataError, match="estimator 'classical' cannot estimate the site: leave latitude_sigma out"):
@@ -159,6 +217,13 @@ def test_recordings_of_a_set_share_what_their_site_is_off_by():
     assert about.names == fit.names
 
 
+def test_recordings_at_sites_of_which_one_states_a_sigma_are_no_set():
+    known, other = SITE, replace(SITE, latitude_rad=0.5, deflection_sigma_rad=DEFLECTION)
+    with pytest.raises(DataError, match=r"one and two are at different sites.* leave deflection_sigma out"):
+        check_one_site([SimpleNamespace(name="one", site=known), SimpleNamespace(name="two", site=other)])
+    check_one_site([SimpleNamespace(name=name, site=other) for name in ("one", "two")])
+
+
 def test_the_filter_on_the_way_holds_the_site_to_be_as_uncertain():
     site = replace(off(), **SIGMAS)
     live = LiveCalibration(OpeningOptions(IMU, site), MODEL)
@@ -172,6 +237,7 @@ def test_the_check_of_the_place_leaves_the_room_that_is_stated():
     wrong = replace(SITE, latitude_rad=SITE.latitude_rad + LATITUDE, gravity_m_s2=9.8 + GRAVITY)
     assert len(contradictions(seen, wrong)) == 2
     assert contradictions(seen, replace(wrong, **SIGMAS)) == ()
+    assert contradictions(seen, replace(wrong, gravity_m_s2=9.8, deflection_sigma_rad=LATITUDE)) == ()
 
 
 def test_a_run_by_hand_takes_the_gravity_of_its_site_with_its_sigma():

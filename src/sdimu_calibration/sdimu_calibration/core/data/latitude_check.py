@@ -67,7 +67,7 @@ class EarthRate:
         """Whether the data were not taken at the latitude of a site, the force times `sign` pointing up."""
         expected = earth.RATE * float(np.sin(site.latitude_rad))
         limit = student_limit(normal_tail(_SIGMAS), self.up_dof) * self.up_sigma
-        told = _SIGMAS * earth.RATE * float(np.cos(site.latitude_rad)) * site.latitude_sigma_rad
+        told = _SIGMAS * earth.RATE * float(np.cos(site.latitude_rad)) * site.astronomic_latitude_sigma_rad
         return self.seen and abs(sign * self.up_rate - expected) > float(np.hypot(limit, told))
 
 

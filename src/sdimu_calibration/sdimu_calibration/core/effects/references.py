@@ -122,8 +122,9 @@ def told_of(site: Site | None, names: Sequence[str]) -> tuple[Reference, ...]:
         return (one(GRAVITY, STANDARD_GRAVITY, 0.0, "standard"),)
     normal = float(earth.normal_gravity(site.latitude_rad, site.height_m))
     gravity, origin = (site.gravity_m_s2, "stated") if site.gravity_m_s2 else (normal, "normal")
+    latitude = "geodetic" if site.deflection_sigma_rad else "stated"
     return (
-        one(LATITUDE, site.latitude_rad, site.latitude_sigma_rad, "stated"),
+        one(LATITUDE, site.latitude_rad, site.astronomic_latitude_sigma_rad, latitude),
         one(GRAVITY, gravity, site.gravity_sigma_m_s2, origin),
     )
 
@@ -135,11 +136,17 @@ def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:
     -------
     tuple of (Effect, float)
         Each with the sigma of its parameter, told minus true (rad, m/s^2). Where gravity is that of the latitude, a
-        wrong latitude is a wrong gravity, too.
+        wrong latitude is a wrong gravity, too; a deflection of the vertical is none.
     """
-    latitude = LATITUDE if site.gravity_m_s2 else _with_its_gravity(site)
-    both = (latitude, site.latitude_sigma_rad), (GRAVITY, site.gravity_sigma_m_s2)
-    return tuple((effect, sigma) for effect, sigma in both if sigma > 0.0)
+    latitude, sigma = LATITUDE, site.astronomic_latitude_sigma_rad
+    gravity = site.gravity_sigma_m_s2
+    if sigma and not site.gravity_m_s2:
+        # Normal gravity goes with the geodetic part of the error alone: what the sum of both says of that part, and
+        # what it leaves open of it.
+        part, slope = (site.latitude_sigma_rad / sigma) ** 2, _slope(site)
+        latitude = _with_gravity(part * slope)
+        gravity = float(np.hypot(gravity, slope * site.latitude_sigma_rad * site.deflection_sigma_rad / sigma))
+    return tuple((effect, size) for effect, size in ((latitude, sigma), (GRAVITY, gravity)) if size > 0.0)
 
 
 def stated_gravity(site: Site | None) -> tuple[tuple[Effect, float], ...]:
@@ -164,9 +171,10 @@ def _slope(site: Site) -> float:
     return float(earth.normal_gravity(high, height) - earth.normal_gravity(low, height)) / (high - low)
 
 
-def _with_its_gravity(site: Site) -> Effect:
-    """Make the effect of a latitude by which gravity was worked out."""
-    slope = _slope(site)
+def _with_gravity(slope: float) -> Effect:
+    """Make the effect of a latitude with which gravity changes (m/s^2/rad)."""
+    if not slope:
+        return LATITUDE
     return replace(
         LATITUDE,
         terms=tuple(Term(channel, 0) for channel in (*GYRO, *ACCEL)),

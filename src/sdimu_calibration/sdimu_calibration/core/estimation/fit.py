@@ -80,8 +80,7 @@ def checksum(*arrays: Floats) -> float:
 def conditions(setup: TestSetup) -> float:
     """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
     site, imu = setup.site, setup.imu
-    sigmas = tuple(v for v in (site.latitude_sigma_rad, site.gravity_sigma_m_s2) if v)
-    place = (site.latitude_rad, site.height_m, setup.gravity, *sigmas)
+    place = (site.latitude_rad, site.height_m, setup.gravity, *site.sigmas.values())
     return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 

@@ -41,9 +41,11 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
             mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, estimate))
             if sensors.names[k] in SITE_REFERENCES:
                 kind = sensors.names[k].removeprefix("reference_")
+                besides = ", deflection_sigma included" if kind == "latitude" else ""
                 out.append(
-                    f"{kind}_sigma of the site ({sigma:.3g} {unit}) contradicts the data: they say that the {kind} "
-                    f"told is too large by {found:.4g} {unit}, {pull[k]:.0f} sigma; correct the {kind}, or its sigma"
+                    f"{kind}_sigma of the site ({sigma:.3g} {unit}{besides}) contradicts the data: they say that "
+                    f"the {kind} told is too large by {found:.4g} {unit}, {pull[k]:.0f} sigma; correct the {kind}, or "
+                    "its sigma"
                 )
                 continue
             out.append(

@@ -140,10 +140,9 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
         )
     site = test.site
     if site is not None and estimator != HandheldFit.estimator and stated_references(site):
-        key = "latitude_sigma" if site.latitude_sigma_rad else "gravity_sigma"
         raise DataError(
-            f"the estimator '{estimator}' cannot estimate the site: leave {key} out of its file, or use one of "
-            f"{', '.join(_TAKES_PRIORS)}"
+            f"the estimator '{estimator}' cannot estimate the site: leave {next(iter(site.sigmas))} out of its file, "
+            f"or use one of {', '.join(_TAKES_PRIORS)}"
         )
 
 

@@ -41,7 +41,7 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
         rate = earth.earth_rate(site.latitude_rad)
         mean[2] = rate[2]
         # The heading is free, so north is any way; 1e-9 rad/s is a ten-thousandth of a degree an hour.
-        down = max(1e-9, abs(rate[0]) * site.latitude_sigma_rad)
+        down = max(1e-9, abs(rate[0]) * site.astronomic_latitude_sigma_rad)
         sigma = np.array([abs(rate[0]) / np.sqrt(2.0) + 1e-9, abs(rate[0]) / np.sqrt(2.0) + 1e-9, down])
     return FitPriors(
         sensors,

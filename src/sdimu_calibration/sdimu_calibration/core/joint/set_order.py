@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.joint.member import Member, Report
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Option, Work
@@ -62,9 +61,10 @@ def check_one_grade(reports: Sequence[Report]) -> None:
 def check_one_site(reports: Sequence[Report]) -> None:
     """Refuse different sites where one of them states a sigma: what it is off by is one number for all recordings."""
     sites = {report.site: report for report in reports}
-    if len(sites) > 1 and any(stated_references(site) for site in sites if site is not None):
+    told = list(dict.fromkeys(key for site in sites if site is not None for key in site.sigmas))
+    if len(sites) > 1 and told:
         first, other = list(sites.values())[:2]
         raise DataError(
-            f"{first.name} and {other.name} are at different sites, and latitude_sigma or gravity_sigma is stated: a "
-            "joint fit estimates the error of one site; leave the sigmas out, or calibrate each site by itself"
+            f"{first.name} and {other.name} are at different sites, and one states how well it is known: a joint fit "
+            f"estimates the error of one site; leave {', '.join(told)} out, or calibrate each site by itself"
         )

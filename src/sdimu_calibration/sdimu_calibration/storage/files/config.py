@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import reprlib
 from collections.abc import Hashable, Mapping
 from difflib import get_close_matches
@@ -31,9 +30,17 @@ from pydantic import (
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.site_reference import BY_FORMULA, DEFLECTION_SIGMAS, GRAVITY_SIGMAS, LATITUDE_SIGMAS
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site, StatedPrior
-from sdimu_calibration.core.units import from_si, parse_quantity, parse_unit
+from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage.files.bounded_file import check_regular, read_text
+from sdimu_calibration.storage.files.quantities import (
+    number_of,
+    quantity,
+    quantity_of_any_unit,
+    sigma_up_to,
+    signed_quantity,
+)
 
 CONFIG_VARIABLE = "SDIMU_CONFIG"
 """Environment variable that names the config folder."""
@@ -44,20 +51,20 @@ LONGEST_PLAN_S = 7.0 * 86400.0
 MOST_TURNS = 2000
 """Number of turns of a plan (1): those of a test are tens, and a forecast of thousands takes minutes."""
 
+LARGEST_LATITUDE_SIGMA = math.radians(2.0)
+"""Largest sigma of a latitude (rad): beyond it the square of the error counts, and a map knows better."""
+
+LARGEST_DEFLECTION_SIGMA = math.radians(0.1)
+"""Largest sigma of the deflection of the vertical (rad): the largest deflections are arcminutes."""
+
+LARGEST_GRAVITY_SIGMA = 0.05
+"""Largest sigma of gravity (m/s^2): from the equator to a pole it changes by as much."""
+
 LONGEST_FILE = 1 << 20
 """Bytes of a configuration at most: reading YAML takes ten seconds a megabyte."""
 
 DEEPEST = 32
 """Lists in lists and keys under keys at most: a configuration needs five."""
-
-LARGEST_LATITUDE_SIGMA = math.radians(2.0)
-"""Largest sigma of a latitude (rad): beyond it the square of the error counts, and a map knows better."""
-
-SMALLEST_SIGMA = 1e-40
-"""Sigma (SI) of any coefficient at least: the squares of smaller ones, and what is divided by them, are no numbers."""
-
-LARGEST_GRAVITY_SIGMA = 0.05
-"""Largest sigma of gravity (m/s^2): from the equator to a pole it changes by as much."""
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 _REPOSITORY = _PACKAGE.parents[2]
@@ -91,63 +98,6 @@ def _parts(kind: Any) -> list[Any]:
 
 
 S = TypeVar("S", bound=Schema)
-
-
-def quantity(expected: str) -> BeforeValidator:
-    """Read text such as ``"2 deg/s"`` into SI, refusing every dimension but that of `expected`."""
-    return BeforeValidator(lambda value: parse_quantity(_as_text(value, expected), expected))
-
-
-def _sigma_up_to(most: float, unit: str) -> BeforeValidator:
-    """Read a sigma with a unit into SI, refusing one below zero or above `most` (SI)."""
-
-    def read(value: Any) -> float:
-        size = parse_quantity(_as_text(value, unit), unit)
-        if not 0.0 <= size <= most:
-            raise ValueError(f"'{value}' is no sigma from 0 to {from_si(most, unit):g} {unit}")
-        return size
-
-    return BeforeValidator(read)
-
-
-def _number_of(unit: str) -> BeforeValidator:
-    """Read a number of a key that names its unit; the unit may stand behind it once more."""
-
-    def read(value: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        try:
-            return float(value)
-        except ValueError:
-            return from_si(parse_quantity(value, unit), unit)
-
-    return BeforeValidator(read)
-
-
-def _as_text(value: Any, expected: str) -> str:
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise ValueError(f"expected a number with a unit, something like '1 {expected}'")
-    return str(value)
-
-
-def _signed_quantity(value: Any) -> tuple[float, str]:
-    # The effect that owns a prior knows its dimension; the file reader does not know effects.
-    text = _as_text(value, "ppm")
-    unit, numbers = re.subn(r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", "", text)
-    if not numbers:
-        raise ValueError(f"'{text}' is not a number with a unit (expected something like '40 ppm' or '1 deg/h')")
-    return parse_quantity(text, unit or "1"), unit
-
-
-def _quantity_of_any_unit(value: Any) -> tuple[float, str]:
-    size, unit = _signed_quantity(value)
-    if size < 0.0:
-        raise ValueError(f"'{value}' is below zero (expected a sigma)")
-    if 0.0 < size < SMALLEST_SIGMA:
-        raise ValueError(
-            f"'{value}' is smaller than any sigma (at least {SMALLEST_SIGMA:g} in SI units; check its exponent)"
-        )
-    return size, unit
 
 
 def config_folder() -> Path:
@@ -357,12 +307,12 @@ class _ImuFile(Schema):
     name: Name | None = None
     grade: Literal["navigation", "tactical", "mems"] = "navigation"
     noise: _NoiseFile
-    prior: dict[str, Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]] = {}
+    prior: dict[str, Annotated[tuple[float, str], BeforeValidator(quantity_of_any_unit)]] = {}
 
 
 class _PriorFile(Schema):
-    value: Annotated[tuple[float, str], BeforeValidator(_signed_quantity)]
-    sigma: Annotated[tuple[float, str], BeforeValidator(_quantity_of_any_unit)]
+    value: Annotated[tuple[float, str], BeforeValidator(signed_quantity)]
+    sigma: Annotated[tuple[float, str], BeforeValidator(quantity_of_any_unit)]
 
 
 class _ModelFile(Schema):
@@ -379,16 +329,26 @@ class _ModelFile(Schema):
 class _SiteFile(Schema):
     format: Literal["sdimu-site/1"] = "sdimu-site/1"
     name: Name | None = None
-    latitude_deg: Annotated[float, _number_of("deg"), Field(ge=-90.0, le=90.0)]
-    height_m: Annotated[float, _number_of("m"), Field(ge=-5000.0, le=20000.0)]
-    gravity_m_s2: Annotated[float, _number_of("m/s^2"), Field(gt=9.5, lt=10.0)] | None = None
-    initial_azimuth_deg: Annotated[float, _number_of("deg"), Field(ge=-360.0, le=360.0)] | None = None
+    latitude_deg: Annotated[float, number_of("deg"), Field(ge=-90.0, le=90.0)]
+    height_m: Annotated[float, number_of("m"), Field(ge=-5000.0, le=20000.0)]
+    gravity_m_s2: Annotated[float, number_of("m/s^2"), Field(gt=9.5, lt=10.0)] | None = None
+    initial_azimuth_deg: Annotated[float, number_of("deg"), Field(ge=-360.0, le=360.0)] | None = None
     magnetic_field_nt: tuple[float, float, float] | None = None
-    initial_azimuth_sigma_deg: Annotated[float, _number_of("deg"), Field(gt=0.0, le=360.0)] = math.degrees(
+    initial_azimuth_sigma_deg: Annotated[float, number_of("deg"), Field(gt=0.0, le=360.0)] = math.degrees(
         Site.initial_azimuth_sigma_rad
     )
-    latitude_sigma: Annotated[float, _sigma_up_to(LARGEST_LATITUDE_SIGMA, "deg")] = 0.0
-    gravity_sigma: Annotated[float, _sigma_up_to(LARGEST_GRAVITY_SIGMA, "mgal")] = 0.0
+    latitude_sigma: Annotated[float, sigma_up_to(LARGEST_LATITUDE_SIGMA, "deg", LATITUDE_SIGMAS)] = 0.0
+    deflection_sigma: Annotated[float, sigma_up_to(LARGEST_DEFLECTION_SIGMA, "arcsec", DEFLECTION_SIGMAS)] = 0.0
+    gravity_sigma: Annotated[float, sigma_up_to(LARGEST_GRAVITY_SIGMA, "mgal", GRAVITY_SIGMAS)] = 0.0
+
+    @field_validator("gravity_sigma", mode="before")
+    @classmethod
+    def _of_a_gravity(cls, value: Any, about: ValidationInfo) -> Any:
+        """Refuse a word on how a gravity was found that the file does not state."""
+        word = isinstance(value, str) and value in GRAVITY_SIGMAS and value != BY_FORMULA
+        if word and about.data.get("gravity_m_s2", True) is None:
+            raise ValueError(f"'{value}' says how gravity_m_s2 was found: state that, too, or write '{BY_FORMULA}'")
+        return value
 
 
 def load_plan(name_or_path: str | Path) -> Plan:
@@ -479,4 +439,5 @@ def load_site(name_or_path: str | Path) -> Site:
         magnetic_field_t=None if field is None else (1e-9 * field[0], 1e-9 * field[1], 1e-9 * field[2]),
         latitude_sigma_rad=file.latitude_sigma,
         gravity_sigma_m_s2=file.gravity_sigma,
+        deflection_sigma_rad=file.deflection_sigma,
     )

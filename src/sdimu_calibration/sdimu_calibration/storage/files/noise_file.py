@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from sdimu_calibration.core.planning.noise_set import NoiseSet
-from sdimu_calibration.storage.files.config import Schema, find_config, quantity, read_yaml
+from sdimu_calibration.storage.files.config import Schema, find_config, read_yaml
+from sdimu_calibration.storage.files.quantities import quantity
 
 
 class _Process(Schema):

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table.description import AxisLimits, RateTable
-from sdimu_calibration.storage.files.config import Schema, find_config, quantity, read_yaml
+from sdimu_calibration.storage.files.config import Schema, find_config, read_yaml
+from sdimu_calibration.storage.files.quantities import quantity
 
 _Axis = Literal["X", "Y", "Z"]
 _Arcseconds = Annotated[float, quantity("arcsec")]
