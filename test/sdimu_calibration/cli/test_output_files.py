@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from pathlib import Path
@@ -11,12 +12,13 @@ import pytest
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.file_room import results_folder
-from sdimu_calibration.storage.files.config import config_folder
+from sdimu_calibration.storage.files.config import config_folder, load_imu
 from sdimu_calibration.storage.files.effect_file import effect_files
 
 WRITERS = {
     "export": "export RESULT --format matrices --out PLACE",
     "export of noise": "export RESULT --format kalibr-noise --out PLACE",
+    "export of an IMU file": "export RESULT --format imu --out PLACE",
     "plan": "plan --plan kim18 --tries 1 --out PLACE",
     "plan backwards": "plan --plan kim18 --backwards --out PLACE",
     "fleet": "fleet BATCH --priors PLACE",
@@ -96,6 +98,18 @@ def test_what_is_read_is_never_written(said, tmp_path, line, source):
     assert (status, err.count("\n")) == (1, 1)
     assert "read" in err
     assert (tmp_path / source).read_bytes() == before
+
+
+def test_the_imu_file_that_a_result_names_is_never_written(said, tmp_path):
+    mine, result = tmp_path / "my.yaml", tmp_path / "batch" / "unit0_0" / "result.json"
+    mine.write_bytes((config_folder() / "imu/dtg.yaml").read_bytes())
+    content = json.loads(result.read_text())
+    result.write_text(json.dumps(content | {"origin": content["origin"] | {"imu_file": str(mine)}}))
+    status, err = said("export RESULT --format imu --out my.yaml --replace")
+    assert (status, f"my.yaml: is read from {mine}" in err) == (1, True)
+    assert said("export RESULT --format imu --out other.yaml")[0] == 0
+    assert said("export RESULT --format imu --out other.yaml --replace")[0] == 0
+    assert load_imu(tmp_path / "other.yaml").prior == load_imu("dtg").prior
 
 
 @pytest.mark.parametrize(("line", "name"), [("noise BAG --out .", "imu.yaml"), ("diagnose BAG --out .", "plan.yaml")])

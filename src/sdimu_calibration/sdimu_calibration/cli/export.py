@@ -22,8 +22,8 @@ def export(
         str,
         typer.Option(
             "--format",
-            help="matrices, kalibr, openvins, imu_tk, px4, ardupilot, c-header, yaml, csv; noise alone: kalibr-noise, "
-            "gtsam.",
+            help="matrices, kalibr, openvins, imu_tk, px4, ardupilot, c-header, yaml, csv; noise alone: imu (what was "
+            "learned, for --imu), kalibr-noise, gtsam.",
         ),
     ] = "matrices",
     out: Annotated[Path | None, typer.Option(help="File to write; beside the result by default.")] = None,
@@ -60,11 +60,12 @@ def export(
     calibration, doubts = read_judged_result(result)
     own = effects_of_result(calibration.model, effect or [])
     folder = result if result.is_dir() else result.parent
-    name = FORMS[form].file_name if form in FORMS else ""
+    name, kind = (FORMS[form].file_name, FORMS[form].kind) if form in FORMS else ("", "")
     specification, whose = noise_for(calibration, imu)
     sources = [folder / "result.json" if result.is_dir() else result, *effect_files(effect or [])]
     sources += [find_config("imu", imu)] if imu else []
-    free = partial(check_file_room, option="--out", kind="sdimu-compensation", replace=replace, sources=sources)
+    sources += [Path(calibration.origin.imu_file)] if calibration.origin.imu_file else []
+    free = partial(check_file_room, option="--out", kind=kind, replace=replace, sources=sources)
     done = write(form, out or folder / name, calibration, specification, own, rate, temperature, free)
     console = plain()
     for text in done.missing:

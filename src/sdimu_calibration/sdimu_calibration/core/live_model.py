@@ -19,8 +19,8 @@ from sdimu_calibration.core.estimation.free_azimuth import stated_noise_hides_az
 from sdimu_calibration.core.filter.filter_pass import NAV, PassState
 from sdimu_calibration.core.filter.noise_states import NoiseStates, with_noise_states
 from sdimu_calibration.core.front_door import OpeningOptions
-from sdimu_calibration.core.planning.stated_noise import stated_noise
 from sdimu_calibration.core.specification import EPOCH_S, Model
+from sdimu_calibration.core.stated_noise import stated_noise
 
 NO_AZIMUTH = (
     "the bias instability that the IMU file states hides the azimuth: the filter on the way estimates the horizontal "

@@ -12,7 +12,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.planning.predict import predict
-from sdimu_calibration.core.planning.stated_noise import stated_noise
+from sdimu_calibration.core.stated_noise import stated_noise
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 

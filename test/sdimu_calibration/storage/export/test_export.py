@@ -15,11 +15,15 @@ import yaml
 
 from sdimu_calibration.core.compensation import compensate, compensator, linear_model
 from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.export import FORMS, export
 from sdimu_calibration.storage.export.shared import number
+from sdimu_calibration.storage.files.config import load_imu
 
 BASELINE = (
     "gyro_bias",
@@ -211,7 +215,54 @@ def test_a_number_is_read_as_the_same_number(value: float) -> None:
 
 
 def test_every_form_is_read_back():
-    assert set(READERS) | set(NOISE_READERS) == set(FORMS)
+    assert set(READERS) | set(NOISE_READERS) | {"imu"} == set(FORMS)
+
+
+LEARNED = (
+    NoiseTerm("gyro", "flicker", size=to_si(0.02, "deg/h")),
+    NoiseTerm("gyro", "markov", tau=100.0, size=to_si(0.5, "deg/h"), alike=("random_walk",)),
+    NoiseTerm("accel", "random_walk", size=to_si(30.0, "ug/sqrt(h)")),
+)
+
+
+def test_an_imu_file_has_the_noise_that_the_calibration_learned_and_the_rest_of_its_own(tmp_path: Path) -> None:
+    used = replace(load_imu("rlg_navigation"), accel_white_noise=to_si(12.5, "ug/sqrt(Hz)")).noise_alone
+    made = replace(result(*BASELINE), noise=LEARNED, origin=Origin(imu="rlg_navigation"), imu_noise=used)
+    done = export("imu", tmp_path / "mine.yaml", made, used)
+    found, base = load_imu(tmp_path / "mine.yaml"), load_imu("rlg_navigation")
+    assert (found.prior, found.grade, found.gyro_white_noise) == (base.prior, base.grade, base.gyro_white_noise)
+    assert from_si(found.accel_white_noise, "ug/sqrt(Hz)") == pytest.approx(12.5)
+    assert from_si(found.gyro_bias_instability, "deg/h") == pytest.approx(0.02)
+    assert from_si(found.accel_random_walk, "ug/sqrt(h)") == pytest.approx(30.0)
+    # The 2 ug of the data sheet were held against the same data, and a walk was found in their place.
+    assert base.accel_bias_instability > 0.0 == found.accel_bias_instability
+    assert sum("Gauss-Markov noise of 100 s" in line for line in done.missing) == 1
+    assert "# NOT IN THIS FILE: gyro Gauss-Markov noise of 100 s" in (tmp_path / "mine.yaml").read_text()
+
+
+def test_an_imu_file_keeps_the_stated_noise_of_a_triad_of_which_nothing_was_learned(tmp_path: Path) -> None:
+    base = load_imu("rlg_navigation")
+    export("imu", tmp_path / "mine.yaml", replace(result(*BASELINE), noise=LEARNED[1:]), base)
+    found = load_imu(tmp_path / "mine.yaml")
+    assert found.gyro_bias_instability == pytest.approx(base.gyro_bias_instability)
+    assert found.accel_bias_instability == 0.0
+
+
+def test_markov_noise_that_may_be_flicker_is_stated_as_that(tmp_path: Path) -> None:
+    tau, size = 100.0, to_si(0.5, "deg/h")
+    alike = NoiseTerm("gyro", "markov", tau=tau, size=size, alike=("flicker",))
+    made = replace(result(*BASELINE), noise=(LEARNED[0], alike))
+    assert len(export("imu", tmp_path / "mine.yaml", made, load_imu("rlg_navigation")).missing) == 1
+    # Allan variance of Markov noise by its integral, at its largest; that of flicker is 2 ln 2 / pi B^2 at any time.
+    x = np.geomspace(0.1, 10.0, 2001)
+    largest = np.sqrt(np.max(size**2 / x * 2.0 * (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x))))
+    expected = np.hypot(LEARNED[0].size, largest / np.sqrt(2.0 * np.log(2.0) / np.pi))
+    assert load_imu(tmp_path / "mine.yaml").gyro_bias_instability == pytest.approx(expected, rel=5e-3)
+
+
+def test_an_imu_file_of_a_result_that_names_none_asks_for_one(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"names no IMU file: state the one that has grade and priors \(--imu\)"):
+        export("imu", tmp_path / "mine.yaml", result(*BASELINE), IMU)
 
 
 @pytest.mark.parametrize("form", NOISE_READERS)

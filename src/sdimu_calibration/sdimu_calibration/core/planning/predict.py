@@ -24,10 +24,11 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.planning.observability import Combination, unobservable
-from sdimu_calibration.core.planning.stated_noise import covariance_in, stated_noise
+from sdimu_calibration.core.planning.stated_noise import covariance_in
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.rotation import rotation_matrix
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
+from sdimu_calibration.core.stated_noise import stated_noise
 
 Bound = Callable[[PreparedData, TestSetup, Alignment], Floats]
 

@@ -10,19 +10,7 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.filter_fit import FilterFit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.stretch_length import wander_in
-from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, NoiseTerm
-from sdimu_calibration.core.specification import ImuSpecification
-
-
-def stated_noise(imu: ImuSpecification) -> tuple[NoiseTerm, ...]:
-    """Noise with a memory that an IMU file states."""
-    sizes = (
-        ("gyro", FLICKER, imu.gyro_bias_instability),
-        ("gyro", RANDOM_WALK, imu.gyro_random_walk),
-        ("accel", FLICKER, imu.accel_bias_instability),
-        ("accel", RANDOM_WALK, imu.accel_random_walk),
-    )
-    return tuple(NoiseTerm(triad, kind, size=size) for triad, kind, size in sizes if size > 0.0)
+from sdimu_calibration.core.noise_term import NoiseTerm
 
 
 def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 from sdimu_calibration.core.compensation import LinearModel, linear_model
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.stated_noise import not_stated
 from sdimu_calibration.storage.export import (
     autopilot,
     c_header,
@@ -20,6 +22,7 @@ from sdimu_calibration.storage.export import (
     matrices,
     noise_file,
     openvins,
+    own_imu,
     yaml_file,
 )
 from sdimu_calibration.storage.export.shared import Source, cannot_hold
@@ -27,12 +30,17 @@ from sdimu_calibration.storage.files.whole_file import write_whole
 
 
 class Form(NamedTuple):
-    """A form: default file name, the texts of its files by what is added to the name, whether noise is in it."""
+    """A form of export."""
 
     file_name: str
     write: Callable[[Source], dict[str, str]]
+    """`file_name`, `write`: default file name, and the texts of its files by what is added to the name."""
     cannot_hold: Callable[[LinearModel], list[str]]
     has_noise: bool = False
+    kind: str = "sdimu-compensation"
+    """`has_noise`, `kind`: whether noise is in it; format of its files, without a number, where it is one of ours."""
+    forgets: Callable[[Sequence[NoiseTerm]], list[str]] = lambda _: []
+    """What it cannot hold of noise that was learned, where it has a place for some."""
 
 
 FORMS = {
@@ -40,6 +48,7 @@ FORMS = {
     "kalibr": Form("imu-kalibr.yaml", kalibr.texts, cannot_hold, True),
     "kalibr-noise": Form("kalibr-imu.yaml", noise_file.kalibr_texts, noise_file.cannot_hold, True),
     "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, cannot_hold, True),
+    "imu": Form("imu.yaml", own_imu.texts, own_imu.cannot_hold, True, "sdimu-imu", not_stated),
     "gtsam": Form("imu_metadata.txt", noise_file.gtsam_texts, noise_file.cannot_hold, True),
     "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
     "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),
@@ -101,7 +110,7 @@ def export(
     linear = linear_model(calibration, own)
     if temperature_degc is not None:
         linear = linear.at(temperature_degc)
-    missing = FORMS[form].cannot_hold(linear)
+    missing = [*FORMS[form].cannot_hold(linear), *FORMS[form].forgets(calibration.noise)]
     source = Source(calibration, linear, imu, rate_hz, tuple(missing))
     texts = FORMS[form].write(source)
     files = {path.with_name(f"{path.stem}{addition}{path.suffix}"): text for addition, text in texts.items()}

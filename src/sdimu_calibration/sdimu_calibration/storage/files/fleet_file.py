@@ -7,8 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.fleet.population import Coefficient
 from sdimu_calibration.core.fleet.priors import population_priors
@@ -16,8 +14,9 @@ from sdimu_calibration.core.fleet.reml import RandomEffect
 from sdimu_calibration.core.fleet.study import Study
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.storage.files.config import find_config, imu_mapping
+from sdimu_calibration.storage.files.config import find_config
 from sdimu_calibration.storage.files.fleet_folder import Gathered
+from sdimu_calibration.storage.files.imu_text import imu_text
 from sdimu_calibration.storage.files.json_file import entry, write_json
 from sdimu_calibration.storage.files.result_file import ORIGIN
 from sdimu_calibration.storage.files.whole_file import same_file, write_whole
@@ -76,13 +75,9 @@ def write_priors(path: Path, base: str, gathered: Gathered, done: Study) -> Mapp
     units = {of[name]: unit for name, unit in zip(first.names, first.display_units, strict=True)}
     sizes = population_priors(done.inside, of)
     priors = {effect: f"{from_si(size, units[effect]):.3g} {units[effect]}" for effect, size in sizes.items()}
-    content = imu_mapping(source)
-    content["name"] = path.stem
-    content["prior"] = {**content.get("prior", {}), **priors}
-    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    remark = (
-        f"# Priors of {len(done.inside.units)} units (sdimu fleet): root mean square of mean, spread and error of the\n"
-        f"# mean, over the coefficients of an effect. Grade, noise and all others are those of '{base}'.\n"
+    remarks = (
+        f"Priors of {len(done.inside.units)} units (sdimu fleet): root mean square of mean, spread and error of the",
+        f"mean, over the coefficients of an effect. Grade, noise and all others are those of '{base}'.",
     )
-    write_whole(path, remark + text)
+    write_whole(path, imu_text(source, path.stem, remarks, priors=priors))
     return priors

@@ -6,23 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from sdimu_calibration.core.noise import TERMS, Terms, WhiteNoise
 from sdimu_calibration.core.noise.white import white_beside
-from sdimu_calibration.core.units import from_si
-from sdimu_calibration.storage.files.config import imu_mapping
+from sdimu_calibration.core.noise_term import TRIADS
+from sdimu_calibration.storage.files.imu_text import imu_text
 from sdimu_calibration.storage.files.whole_file import write_whole
 
-GYRO_UNIT, ACCEL_UNIT = "deg/h/sqrt(Hz)", "ug/sqrt(Hz)"
-
-
-_MEMORY = {
-    "quantisation": ("quantisation", {"gyro": "arcsec", "accel": "mm/s"}),
-    "instability": ("bias_instability", {"gyro": "deg/h", "accel": "ug"}),
-    "random_walk": ("random_walk", {"gyro": "deg/h/sqrt(h)", "accel": "ug/sqrt(h)"}),
-}
-"""Keys of an IMU file: of the terms beside white noise, and their units by triad."""
+_MEMORY = {"quantisation": "quantisation", "instability": "bias_instability", "random_walk": "random_walk"}
+"""Keys of an IMU file, of the terms beside white noise."""
 _SHORT = ("quantisation",)
 """Terms that are believed where the terms do not explain the deviation: they show in times shorter than any rocking."""
 
@@ -43,20 +35,13 @@ def write_measured_imu(
     remarks : sequence of str
         Comments for the head of the file.
     """
-    content = imu_mapping(base)
-    content["name"] = path.stem
     noise = {}
-    for triad, unit in (("gyro", GYRO_UNIT), ("accel", ACCEL_UNIT)):
+    for triad in TRIADS:
         found = memory_of(terms, triad)
-        noise[triad] = f"{from_si(white_of(measured, terms, triad, found.get('quantisation', 0.0)), unit):.5g} {unit}"
-        for term, size in found.items():
-            key, units = _MEMORY[term]
-            noise[f"{triad}_{key}"] = f"{from_si(size, units[triad]):.3g} {units[triad]}"
-    content["noise"] = noise
-    lines = [f"# {remark}" for remark in remarks]
-    lines.append(f"# Grade and priors are those of '{base}': they are not measured here.")
-    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-    write_whole(path, "\n".join(lines) + "\n" + text)
+        noise[triad] = white_of(measured, terms, triad, found.get("quantisation", 0.0))
+        noise |= {f"{triad}_{_MEMORY[term]}": size for term, size in found.items()}
+    own = f"Grade and priors are those of '{base}': they are not measured here."
+    write_whole(path, imu_text(base, path.stem, [*remarks, own], noise))
 
 
 def white_of(measured: WhiteNoise, terms: Mapping[str, Terms], triad: str, residue: float) -> float:
