@@ -29,6 +29,13 @@ def test_metres_are_told_beside_what_the_last_fit_predicted(metres, told):
     assert InUse(10.0, 2, NAMES, metres, 27.0).words.endswith(f"with what was found; {told}")
 
 
+def test_what_was_found_is_held_against_the_model_as_given():
+    """Not against that with one effect less, which holds most of what was found."""
+    grown = (*NAMES[:2], "+ an effect", NAMES[2])
+    assert not InUse(10.0, 2, grown, (2500.0, 200.0, 30.0, 105.0), 27.0).fails
+    assert InUse(10.0, 2, grown, (2500.0, 40.0, 200.0, 105.0), 27.0).fails
+
+
 def test_a_model_that_lacks_nothing_is_not_said_to_fail():
     assert InUse(10.0, 1, NAMES[:2], (2500.0, 500.0), 27.0).words.endswith(
         "model as given; the last fit predicted 27 m"

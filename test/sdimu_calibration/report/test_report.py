@@ -29,10 +29,12 @@ from sdimu_calibration.report import (
     use_section,
 )
 from sdimu_calibration.report.coefficients import as_csv, as_yaml, grouped_table
+from sdimu_calibration.report.cost import in_use, in_use_entry, metres
 from sdimu_calibration.report.evidence_figures import heat_maps
+from sdimu_calibration.report.first_screen import ladder_strip
 from sdimu_calibration.report.markup import prose, section, signs
 from sdimu_calibration.report.page import Contents, page
-from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.report_extras import ReportExtras, report_extras
 from sdimu_calibration.report.sections import confused, found_table
 from sdimu_calibration.report.table import rows
 from sdimu_calibration.report.traceability import recorded, traceability
@@ -180,6 +182,33 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
     text = page(diagnosis.after, Contents("x", summary=summarise(replace(diagnosis, rungs=rungs))))
     for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
         assert word in text
+
+
+@pytest.fixture(scope="module")
+def grown(diagnosis: Diagnosis) -> Diagnosis:
+    """A ladder of three models: the one between is that with what was found."""
+    numbers = (True, "", 20.0, 30.0, 1.01, 0.98, 1.0, 0.001, ())
+    fits = {"": diagnosis.fit, "one": diagnosis.extended, "other": diagnosis.extended}
+    return replace(diagnosis, rungs=tuple(Rung(added, *numbers, fit=fit) for added, fit in fits.items()))
+
+
+def test_every_rung_has_its_metres(grown):
+    """Those between the ends had none: a reader saw an error fall of which nobody said what it is worth."""
+    more = report_extras(grown)
+    last = metres(in_use(more).distance[-1])
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", ladder_strip(summarise(grown), more))
+    assert cells[cells.index("+ one") + 1] == cells[cells.index("+ other") + 1] == last
+    told = {one["model"]: one["rms_m"] for one in in_use_entry(more)["position"]}
+    assert list(told) == ["not compensated", "model as given", "+ one", "with what was found"]
+    assert told["+ one"] == pytest.approx(told["with what was found"], rel=1e-9)
+    assert told["model as given"] != pytest.approx(told["+ one"], rel=1e-3)
+
+
+def test_the_figure_in_use_shows_the_ends_of_a_ladder(grown):
+    """It has ink and dashes for three."""
+    names = {trace["name"] for trace in use_section.figure(report_extras(grown).trials).data}
+    assert {"model as given", "with what was found"} <= names
+    assert "+ one" not in names
 
 
 def test_the_threshold_is_drawn(diagnosis, more):

@@ -27,7 +27,7 @@ from sdimu_calibration.core.plan_search import NextTurn, Question, next_turn, un
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
-from sdimu_calibration.report.cost import held_to_use
+from sdimu_calibration.report.cost import held_to_use, in_use_entry
 from sdimu_calibration.report.drawing import Figure
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
@@ -202,7 +202,7 @@ class FitDiagnosis(Diagnosed):
         more = report_extras(self.core, self._delivered)
         told = held_to_use(self.core, more)
         with written_together(folder) as part:
-            write_diagnosis(part / "diagnosis.json", summarise(told))
+            write_diagnosis(part / "diagnosis.json", summarise(told), in_use=in_use_entry(more))
             write_result(part / "result.json", told.after, told.verdict)
             write_report(
                 part / "report.html", told.after, title="Diagnosis", summary=summarise(told), more=more, trace=traced()

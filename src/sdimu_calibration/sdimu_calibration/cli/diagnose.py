@@ -126,6 +126,7 @@ class Findings:
 def _write(what: Findings, trace: Trace) -> None:
     """Leave diagnosis.json, result.json and report.html."""
     from sdimu_calibration.core.diagnosis.plan_seen import as_plan
+    from sdimu_calibration.report.cost import in_use_entry
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
     from sdimu_calibration.storage.files.plan_file import write_plan
@@ -134,7 +135,7 @@ def _write(what: Findings, trace: Trace) -> None:
     summary = what.summary
     found = summary.diagnosis
     with written_together(what.about.folder) as part:
-        write_diagnosis(part / "diagnosis.json", summary, what.null)
+        write_diagnosis(part / "diagnosis.json", summary, what.null, in_use_entry(what.more))
         write_result(part / "result.json", found.after, found.verdict)
         if (plan := as_plan(summary.plan)) is not None:
             write_plan(part / PLAN, plan, [f"{PLAN_SHOWN}, for: sdimu plan --plan"])

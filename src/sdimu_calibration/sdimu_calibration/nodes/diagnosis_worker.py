@@ -27,7 +27,7 @@ from sdimu_calibration.core.front_door import OpeningOptions, open_test
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.report.cost import held_to_use
+from sdimu_calibration.report.cost import held_to_use, in_use_entry
 from sdimu_calibration.report.live_picture import live_picture
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
@@ -185,7 +185,7 @@ def leave_report(folder: Path, test: PreparedTest, model: Model, name: str) -> N
     summary = summarise(held_to_use(found, more))
     result = outcome(found.fit, refuse=False)
     with written_together(folder) as part:
-        write_diagnosis(part / DIAGNOSIS, summary)
+        write_diagnosis(part / DIAGNOSIS, summary, in_use=in_use_entry(more))
         title = f"Live test, model {name}"
         write_report(part / REPORT, result, title=title, summary=summary, more=more, trace=traced(model=name))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -138,7 +139,12 @@ class InUse:
         """Whether the navigation contradicts what was found: worse with it than without, and than chance allows."""
         if not np.isfinite(self.promised) or len(self.distance) < 3:
             return False
-        return self.distance[-1] > max(self.distance[-2], _CHANCE * self.promised)
+        return self.distance[-1] > max(self.as_given, _CHANCE * self.promised)
+
+    @property
+    def as_given(self) -> float:
+        """The distance with the model as given (m), whatever models stand between it and the last."""
+        return self.distance[1]
 
 
 def held_to_use(d: Diagnosis, more: ReportExtras | None) -> Diagnosis:
@@ -159,7 +165,7 @@ def held_to_use(d: Diagnosis, more: ReportExtras | None) -> Diagnosis:
         return d
     told = (
         f"{_NOT_HELD}: after {use.minutes:.0f} min without aid the position is {metres(use.distance[-1])} off, "
-        f"{metres(use.distance[-2])} without it, {metres(use.promised)} as predicted: the estimate is {NOT_TRUSTED}"
+        f"{metres(use.as_given)} without it, {metres(use.promised)} as predicted: the estimate is {NOT_TRUSTED}"
     )
     after = d.after.warned(Note(told, Topic.NOT_TRUSTED))
     return replace(d, sentence=sentence(d, d.found_effects, held=False), after=after)
@@ -176,6 +182,22 @@ def in_use(more: ReportExtras | None) -> InUse | None:
     promised = np.array([float(trial.drifts[-1].promised[-1]) for trial in trials])
     distance = np.sqrt(np.mean(ends**2, axis=0)).tolist()
     return InUse(minutes, len(trials), names, tuple(distance), float(np.sqrt(np.mean(promised**2))))
+
+
+def in_use_entry(more: ReportExtras | None) -> dict[str, Any] | None:
+    """Give the navigations without aid as plain data: error of position with each model (m); None where there is none.
+
+    The models are those of the ladder, behind the samples as they are.
+    """
+    use = in_use(more)
+    if use is None:
+        return None
+    return {
+        "length_s": 60.0 * use.minutes,
+        "stretches": use.stretches,
+        "position": [{"model": name, "rms_m": size} for name, size in zip(use.names, use.distance, strict=True)],
+        "predicted_m": use.promised,
+    }
 
 
 def in_metres(values: Sequence[float]) -> str:

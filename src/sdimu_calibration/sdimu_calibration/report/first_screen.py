@@ -277,6 +277,5 @@ def _line(name: str, place: int, models: int, error: float, use: InUse | None) -
     if use is None:
         return [name, held_out]
     distance = dict(zip(use.names, use.distance, strict=True))
-    # Of the models between, no navigation was tried.
-    key = "model as given" if not place else "with what was found" if place == models - 1 else ""
+    key = "with what was found" if place == models - 1 else name
     return [name, metres(distance[key]) if key in distance else "", held_out]

@@ -164,7 +164,7 @@ def in_use(trials: Sequence[FreeInertialRun]) -> Figure:
     first = None
     for place, trial in enumerate(trials, 1):
         first = axes = figure.add_subplot(1, len(trials), place, sharey=first)
-        for (ink, dash), drift in zip(((_MUTED, ":"), (_BEFORE, "--"), (_AFTER, "-")), trial.drifts, strict=False):
+        for (ink, dash), drift in zip(((_MUTED, ":"), (_BEFORE, "--"), (_AFTER, "-")), trial.ends, strict=False):
             rows = drift.t >= 30.0
             axes.semilogy(drift.t[rows] / 60.0, drift.distance[rows], dash, color=ink, lw=1.8, label=drift.name)
         axes.set_title(f"Unseen {trial.segment.place} of the recording")

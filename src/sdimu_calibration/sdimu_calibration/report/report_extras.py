@@ -32,7 +32,8 @@ def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportE
     `delivered`: the fit that was diagnosed, as a calibration delivers it; without it the fit of the diagnosis stands in
     its place.
     """
-    rivals = [("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
+    between = [(rung.name, rung.fit) for rung in diagnosis.rungs[1:-1] if rung.fit is not None]
+    rivals = [*between, ("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table
     given = None if delivered is None else outcome(delivered, refuse=False)
     try:

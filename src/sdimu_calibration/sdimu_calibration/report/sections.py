@@ -118,7 +118,7 @@ def refits(rungs: Sequence[Rung]) -> str:
 def _refit(r: Rung) -> list[str]:
     moved = ", ".join(f"{name} {size:+.1f}" for name, size in r.moved[:3])
     return [
-        f"+ {r.added}" if r.added else "model as given",
+        r.name,
         f"{r.log_likelihood:.1f}",
         f"{r.log_bayes_factor:+.1f}" if r.added else "",
         f"{r.nis_mean:.3f}",

@@ -107,7 +107,7 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
         gap_x=0.04,
     )
     for column, trial in enumerate(trials, 1):
-        for (ink, dash), drift in zip(_INK, trial.drifts, strict=False):
+        for (ink, dash), drift in zip(_INK, trial.ends, strict=False):
             rows = drift.t >= _SKIP_S
             heading = from_si(1.0, "arcmin") * np.abs(drift.heading)
             for row, (values, unit) in enumerate(

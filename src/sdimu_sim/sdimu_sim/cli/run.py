@@ -334,6 +334,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
+    from sdimu_calibration.report.cost import in_use_entry
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.report_extras import report_extras
     from sdimu_calibration.report.table import rich_table, rows
@@ -355,7 +356,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
     asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
     with written_together(out) as part:
-        write_diagnosis(part / "diagnosis.json", summary)
+        write_diagnosis(part / "diagnosis.json", summary, in_use=in_use_entry(more))
         _write_plan(part, out, test, summary)
         write_report(
             part / "report.html",

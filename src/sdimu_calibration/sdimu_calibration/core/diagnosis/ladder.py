@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +47,13 @@ class Rung:
     """Coefficients that moved against the rung before, in their sigmas, largest first."""
     scatter: tuple[float, ...] | None = None
     """What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle)."""
+    fit: Fit | None = field(default=None, repr=False, compare=False)
+    """The model fitted to the whole recording."""
+
+    @property
+    def name(self) -> str:
+        """Of the model, as a ladder tells it."""
+        return f"+ {self.added}" if self.added else "model as given"
 
 
 def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:
@@ -81,7 +88,7 @@ def error_ladder(d: Diagnosis) -> list[tuple[str, float]]:
     With every effect by itself where the model was grown, else with all of them at once; with nothing found one entry.
     """
     if d.rungs:
-        return [(f"+ {r.added}" if r.added else "model as given", r.held_out_rms) for r in d.rungs]
+        return [(r.name, r.held_out_rms) for r in d.rungs]
     first = ("model as given", held_out(d.before))
     added = [c.label for c in d.chosen]
     name = f"+ {added[0]}" if len(added) == 1 else f"+ {len(added)} effects"
@@ -105,6 +112,7 @@ def _rung(
         velocity,
         moved_coefficients(earlier, result) if earlier else (),
         tuple(fit.scatter.tolist()) if isinstance(fit, HandheldFit) else None,
+        fit,
     )
     reason = refused(rung, below)
     return replace(rung, accepted=not reason, reason=reason)

@@ -86,6 +86,11 @@ class FreeInertialRun:
     drifts: tuple[Drift, ...]
     """Without compensation, then with each model."""
 
+    @property
+    def ends(self) -> tuple[Drift, ...]:
+        """The drifts without those of models between the first and the last."""
+        return (*self.drifts[:2], *self.drifts[2:][-1:])
+
 
 class Compensated(NamedTuple):
     """Cycles without the sensor errors of a fit, and how they change with its coefficients.

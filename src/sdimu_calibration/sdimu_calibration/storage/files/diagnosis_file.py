@@ -84,6 +84,7 @@ class DiagnosisFile(ResultModel):
     fit: Any = None
     ladder: Rows = ()
     grown: Rows = ()
+    in_use: Row = None
     plan: Row = None
     not_testable: Rows = ()
     smallest_detectable: Rows = ()
@@ -91,9 +92,9 @@ class DiagnosisFile(ResultModel):
     bootstrap: Row = None
 
 
-def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None) -> None:
-    """Write diagnosis.json. `null` is that of a bootstrap."""
-    _file(summary, **({"bootstrap": _null(null)} if null else {})).write(path)
+def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None, in_use: Row = None) -> None:
+    """Write diagnosis.json. `null` is that of a bootstrap, `in_use` as `report.cost.in_use_entry` has it."""
+    _file(summary, in_use=in_use, **({"bootstrap": _null(null)} if null else {})).write(path)
 
 
 def read_diagnosis(path: Path) -> DiagnosisFile:
