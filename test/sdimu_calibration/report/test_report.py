@@ -35,7 +35,7 @@ from sdimu_calibration.report.first_screen import ladder_strip
 from sdimu_calibration.report.markup import prose, section, signs
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras, report_extras
-from sdimu_calibration.report.sections import confused, found_table
+from sdimu_calibration.report.sections import classes_of, confused, found_table
 from sdimu_calibration.report.table import rows
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.storage.trace import Trace
@@ -257,11 +257,41 @@ def test_what_looks_the_same_shares_the_bar_of_what_was_found(diagnosis):
     other = next(one.label for one in entries if not one.chosen and one.z and "(" not in one.label)
     alone = evidence_figures.ranking(entries, 4.0).data[0]
     assert other in alone["y"]
-    shares = {found.label: {found.label.partition("(")[0]: "82 %", other: "18 %"}}
-    folded = evidence_figures.ranking(entries, 4.0, shares).data[0]
+    shares = {found.coefficient: {found.coefficient: "82 %", other: "18 %"}}
+    figure = evidence_figures.ranking(entries, 4.0, shares)
+    folded, axis = figure.data[0], figure.layout["yaxis"]
     assert other not in folded["y"]
     (words,) = (text for text in folded["customdata"] if "82 %" in text)
-    assert words.endswith(f", 82 %; or {other} 18 %")
+    assert words.startswith(f"{found.coefficient} 82 %<br>")
+    assert words.endswith(f"<br>or {other} 18 %")
+    (name,) = (text for text in axis["ticktext"] if text.startswith("\N{BLACK RIGHT-POINTING TRIANGLE}"))
+    assert name.endswith(f" {evidence_figures.with_look_alikes([found.coefficient, other])}")
+    assert axis["tickvals"] == folded["y"]
+
+
+@pytest.mark.parametrize(
+    ("others", "told"),
+    [
+        ((), "gyro_bias_ramp_x"),
+        (("gyro_bias_warm_up_x",), "gyro_bias_ramp_x or \N{HORIZONTAL ELLIPSIS}warm_up_x"),
+        (("accel_cubic_x",), "gyro_bias_ramp_x or accel_cubic_x"),
+        (
+            ("gyro_bias_warm_up_x", "gyro_bias_wrap_xx", "gyro_bias_step_x"),
+            "gyro_bias_ramp_x or \N{HORIZONTAL ELLIPSIS}warm_up_x and 2 more",
+        ),
+        (("gyro_mass_unbalance_ramp_qx(tau=2400 s)",) * 2, "gyro_bias_ramp_x and 2 more"),
+    ],
+)
+def test_a_bar_names_its_look_alikes_as_far_as_there_is_room(others, told):
+    assert evidence_figures.with_look_alikes(["gyro_bias_ramp_x", *others]) == told
+
+
+def test_a_bar_of_a_class_says_how_probable_its_own_effect_is(diagnosis):
+    """The likeliest of a class stood there, whichever effect had the bar."""
+    (one,) = summarise(diagnosis).found
+    own = one.candidate.coefficient
+    (shares,) = classes_of([replace(one, may_be=(Share("other_effect", 0.7), Share(own, 0.3)))]).values()
+    assert list(shares.items()) == [(own, "30 %"), ("other_effect", "70 %")]
 
 
 def test_a_map_of_rests_does_not_call_them_stops():

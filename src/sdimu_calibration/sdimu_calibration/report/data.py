@@ -157,6 +157,11 @@ class Scored:
     """Share of its signature that the model leaves."""
     chosen: bool
 
+    @property
+    def coefficient(self) -> str:
+        """The label without onset or time constant."""
+        return self.label.partition("(")[0]
+
 
 def scored(diagnosis: Diagnosis) -> list[Scored]:
     """Every candidate of catalogue and own equations that was tried, largest score first."""
@@ -178,9 +183,8 @@ def best_variants(entries: Sequence[Scored]) -> list[Scored]:
     """Those with a score, one a parameter: what was found, else the best of the onsets or time constants tried."""
     best: dict[str, Scored] = {}
     for entry in entries:
-        name = entry.label.partition("(")[0]
-        if entry.z and (entry.chosen or name not in best):
-            best[name] = entry
+        if entry.z and (entry.chosen or entry.coefficient not in best):
+            best[entry.coefficient] = entry
     return sorted(best.values(), key=lambda row: -abs(row.z))
 
 

@@ -100,16 +100,15 @@ def ranking(
 ) -> Figure:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches.
 
-    `threshold`: score that noise reaches. `classes`: by the label of an effect that was found: what it may be, itself
-    first, each with its probability in words. Those share the bar of the effect.
+    `threshold`: score that noise reaches. `classes`: by the coefficient of an effect that was found: what it may be,
+    itself first, each with its probability in words. Those share bar and name of the effect, and what the mouse tells.
     """
     told = classes or {}
-    found = {label.partition("(")[0] for label in told}
-    folded = {name for shares in told.values() for name in shares} - found
-    left = [s for s in data.best_variants(entries) if s.chosen or s.label.partition("(")[0] not in folded]
-    shown = left[:_MOST_BARS]
-    names = [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + literal(s.label) for s in shown]
-    sizes = [with_sigma(s.estimate, s.sigma, s.unit) + _shares_in_words(s, told.get(s.label, {})) for s in shown]
+    folded = {name for shares in told.values() for name in shares} - set(told)
+    shown = [s for s in data.best_variants(entries) if s.chosen or s.coefficient not in folded][:_MOST_BARS]
+    marks = ["\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "" for s in shown]
+    names = [m + literal(s.label) for m, s in zip(marks, shown, strict=True)]
+    shares = [told.get(s.coefficient, {}) for s in shown]
     figure = Figure()
     figure.add(
         "bar",
@@ -123,8 +122,8 @@ def ranking(
             "line": {"color": INK, "width": 1},
         },
         showlegend=False,
-        customdata=sizes,
-        hovertemplate="%{y}<br>|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
+        customdata=[_in_full(s, share) for s, share in zip(shown, shares, strict=True)],
+        hovertemplate="|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
     )
     # Beside the bar, but never under the line of the noise.
     figure.add(
@@ -132,7 +131,7 @@ def ranking(
         y=names,
         x=[max(abs(s.z), threshold) for s in shown],
         mode="text",
-        text=[f"\N{NO-BREAK SPACE}{size}" for size in sizes],
+        text=[f"\N{NO-BREAK SPACE}{_size(s)}" for s in shown],
         textposition="middle right",
         cliponaxis=False,
         hoverinfo="skip",
@@ -156,6 +155,9 @@ def ranking(
     top = max([abs(s.z) for s in shown] + [threshold])
     figure.x_axes(title="score |z| (sigma)", range=[0, _BESIDE * top])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
+    # A category stays the label, by which a click takes it.
+    alike = [m + with_look_alikes(list(one) or [s.label]) for m, s, one in zip(marks, shown, shares, strict=True)]
+    figure.y_axes(tickmode="array", tickvals=names, ticktext=alike)
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
@@ -181,11 +183,39 @@ def _family_ink(label: str) -> str:
     return _FAMILY_INK[{"gyro": "gyro", "accel": "accelerometer"}.get(triad, "other")]
 
 
-def _shares_in_words(entry: data.Scored, shares: Mapping[str, str]) -> str:
-    """Say how probable a bar is, and what it may be instead; empty where it is told which effect it is."""
-    own = entry.label.partition("(")[0]
-    others = [f"or {literal(name)} {p}" for name, p in shares.items() if name != own]
-    return "; ".join([f", {shares.get(own, '')}", *others]) if others else ""
+def _size(entry: data.Scored) -> str:
+    return with_sigma(entry.estimate, entry.sigma, entry.unit)
+
+
+def _in_full(entry: data.Scored, shares: Mapping[str, str]) -> str:
+    """Name a bar with its size, and a line each, what it may be, with the probability."""
+    own, *others = (f"{literal(name)} {p}" for name, p in (shares or {entry.label: ""}).items())
+    return "<br>or ".join([f"{own.strip()}<br>{_size(entry)}", *others])
+
+
+_WIDEST = 44
+"""Number of characters of a name with those of its class: longer ones leave a narrow window no room for bars."""
+
+
+def with_look_alikes(names: Sequence[str]) -> str:
+    """Name a bar by its effect and what that may be instead: as many as there is room for, and how many more.
+
+    What another name begins with as the first one does is left out of it.
+    """
+    first, *others = names
+    for count in range(len(others), 0, -1):
+        more = f" and {len(others) - count} more" if count < len(others) else ""
+        told = " or ".join([first, *(_short(first, other) for other in others[:count])]) + more
+        if len(told) <= _WIDEST:
+            return literal(told)
+    return literal(f"{first} and {len(others)} more" if others else first)
+
+
+def _short(first: str, other: str) -> str:
+    """Return another name without the words in which it begins as the first one does."""
+    words = other.split("_")
+    differs = next((k for k, pair in enumerate(zip(words, first.split("_"), strict=False)) if len(set(pair)) > 1), 0)
+    return f"\N{HORIZONTAL ELLIPSIS}{'_'.join(words[differs:])}" if differs else other
 
 
 def explained(parts: Sequence[data.Explained]) -> Figure:

@@ -173,7 +173,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
             quiet(
                 "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
                 "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect; "
-                "what looks the same shares its bar, each with its probability."
+                "what looks the same shares its bar and its line of names. Under the mouse each has its probability."
             ),
         ),
         folded("Steps of the search", ladder(d)),
@@ -183,9 +183,13 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
 
 
 def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
-    """Say what each effect that was found may be, itself first, each with its probability in words."""
-    named = {one.candidate.label: percents_of(one.may_be) for one in found}
-    return {label: shares for label, shares in named.items() if len(shares) > 1}
+    """Say what each coefficient that was found may be, itself first, each with its probability in words."""
+    out = {}
+    for one in found:
+        own, shares = one.candidate.coefficient, percents_of(one.may_be)
+        if set(shares) - {own}:
+            out[own] = {own: in_percent(0.0)} | shares
+    return out
 
 
 _FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor")

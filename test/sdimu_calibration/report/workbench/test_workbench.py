@@ -19,9 +19,7 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.cost import wrong_without
-from sdimu_calibration.report.data import Scored
 from sdimu_calibration.report.report_extras import report_extras
-from sdimu_calibration.report.workbench import figures
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.parts import numbers
@@ -463,15 +461,3 @@ def test_a_recording_that_was_changed_in_place_is_opened_anew(tmp_path):
     file.parent.rmdir()
     shelf.bench("a")
     assert opened == ["a", "bare", "a", "a"]
-
-
-def test_look_alikes_share_a_bar_that_tells_how_probable_its_effect_is():
-    """The score alone puts the less probable first, and the first is what a key adds."""
-    scores = {"gyro_scale_quadratic_y": 46.1, "gyro_scale_asymmetry_y": 46.0, "accel_cubic_x": 5.0}
-    entries = [Scored(name, "", "ppm", z, z, 1.0, 0.1, 1.0, 1.0, 1.0, chosen=False) for name, z in scores.items()]
-    classes = {"gyro_scale_asymmetry_y": {"gyro_scale_asymmetry_y": "85 %", "gyro_scale_quadratic_y": "15 %"}}
-    assert figures.ranking(entries, 4.1).data[0]["y"][0] == "gyro_scale_quadratic_y"
-    bars = figures.ranking(entries, 4.1, classes).data[0]
-    assert bars["y"] == ["gyro_scale_asymmetry_y", "accel_cubic_x"]
-    assert bars["text"] == ["85 %", ""]
-    assert bars["customdata"][0].endswith("or gyro_scale_quadratic_y 15 %")

@@ -72,8 +72,9 @@ def ranking(
     for key in ("x", "y", "customdata"):
         bars[key] = bars[key][:_MOST_BARS]
     bars["marker"] |= {key: bars["marker"][key][:_MOST_BARS] for key in ("color", "opacity")}
+    shares = [(classes or {}).get(label.partition("(")[0], {}) for label in bars["y"]]
     bars |= {
-        "text": [_share((classes or {}).get(label, {})) for label in bars["y"]],
+        "text": [next(iter(share.values()), "") for share in shares],
         "constraintext": "none",
         "textposition": "inside",
         "insidetextanchor": "start",
@@ -86,11 +87,6 @@ def ranking(
     figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
     figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
     return figure
-
-
-def _share(shares: Mapping[str, str]) -> str:
-    """Say how probable the first of a class is; empty where there is no class. The others stand under the mouse."""
-    return next(iter(shares.values())) if len(shares) > 1 else ""
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ class Missing:
     """The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
     """
     classes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """What each effect that was found may be, itself first, each with its probability in words."""
+    """What each coefficient that was found may be, itself first, each with its probability in words."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,28 @@
+"""Bars of the workbench: what looks the same shares one."""
+
+from __future__ import annotations
+
+from sdimu_calibration.report.data import Scored
+from sdimu_calibration.report.workbench import figures
+
+
+def test_look_alikes_share_a_bar_that_tells_how_probable_its_effect_is():
+    """The score alone puts the less probable first, and the first is what a key adds."""
+    scores = {"gyro_scale_quadratic_y": 46.1, "gyro_scale_asymmetry_y": 46.0, "accel_cubic_x": 5.0}
+    entries = [Scored(name, "", "ppm", z, z, 1.0, 0.1, 1.0, 1.0, 1.0, chosen=False) for name, z in scores.items()]
+    classes = {"gyro_scale_asymmetry_y": {"gyro_scale_asymmetry_y": "85 %", "gyro_scale_quadratic_y": "15 %"}}
+    assert figures.ranking(entries, 4.1).data[0]["y"][0] == "gyro_scale_quadratic_y"
+    bars = figures.ranking(entries, 4.1, classes).data[0]
+    assert bars["y"] == ["gyro_scale_asymmetry_y", "accel_cubic_x"]
+    assert bars["text"] == ["85 %", ""]
+    assert bars["customdata"][0].endswith("or gyro_scale_quadratic_y 15 %")
+
+
+def test_a_bar_of_look_alikes_has_its_probability_whatever_time_constant_scores_most():
+    label = "gyro_bias_warm_up_x(tau=2400 s)"
+    entries = [Scored(label, "", "deg/h", 9.0, 9.0, 1.0, 0.1, 1.0, 1.0, 1.0, chosen=False)]
+    classes = {"gyro_bias_warm_up_x": {"gyro_bias_warm_up_x": "85 %", "gyro_bias_ramp_x": "15 %"}}
+    figure = figures.ranking(entries, 4.1, classes)
+    assert figure.data[0]["y"] == [label]
+    assert figure.data[0]["text"] == ["85 %"]
+    assert "gyro_bias_ramp_x 15 %" in figure.data[0]["customdata"][0]
