@@ -231,6 +231,8 @@ def _own_share(one: Found) -> str:
     return percents_of(one.may_be).get(one.candidate.coefficient, alone)
 
 
+_AT_STAKE = 3
+"""Number of coefficients that are named as hanging on a choice, of those that move and of those known less well."""
 _TELLS_APART = {Kind.RECORD_ONCE_MORE, Kind.NO_TURN_TELLS, Kind.NO_PLAN_TELLS, Kind.TELL_APART, Kind.RANK_TURNS}
 
 
@@ -257,10 +259,16 @@ def confused(summary: DiagnosisSummary, spell: Spell | None = None) -> str:
         others = "; ".join(part for part in (others, pairs) if part)
         if not others:
             continue
-        stake = "; ".join(
+        moved = [
             f"with {s.other} instead, {s.coefficient} moves by {s.sigmas:+.1f} of its sigmas"
-            for s in one.coefficient_shifts[:3]
-        )
+            for s in one.coefficient_shifts[:_AT_STAKE]
+        ]
+        wider = [
+            f"the sigma of {name} is {factor:.1f} times what it would be if this were known to be "
+            f"{one.candidate.coefficient}"
+            for name, factor in one.widened[:_AT_STAKE]
+        ]
+        stake = "; ".join([*moved, *wider])
         rows.append(
             f'<tr><td class="text"><code>{escape(one.candidate.label)}</code></td><td class="text">{others}</td>'
             f'<td class="text">{prose(stake) or "nothing that matters"}</td></tr>'

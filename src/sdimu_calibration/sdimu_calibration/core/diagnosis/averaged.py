@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.rounds import Round
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.posterior.coefficients import Averages
+from sdimu_calibration.core.estimation.outcome import WIDER
+from sdimu_calibration.core.evidence.linear import E
+from sdimu_calibration.core.posterior.coefficients import Averages, Moments
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
+from sdimu_calibration.core.posterior.posterior import Posterior
 
 
 def over_all_models(base: Fit, done: Round) -> Fit:
@@ -35,6 +40,39 @@ def over_all_models(base: Fit, done: Round) -> Fit:
     moved[own] = all_.mean - one.mean
     doubt[np.ix_(own, own)] = none_below_zero(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))
     return done.fit.with_doubt(doubt, moved)
+
+
+def widened_by(fit: Fit, found: Posterior[E], columns: Iterable[int]) -> dict[int, tuple[tuple[str, float], ...]]:
+    """Coefficients that are known less well because it is open which effect of a class is there, the worst first.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the model as given.
+    columns : iterable of int
+        Of the evidence: effects that are told, each of an open class.
+
+    Returns
+    -------
+    dict of int to tuple of (str, float)
+        Of each column: name, and sigma over all models over that in the models that hold its effect, with whatever time
+        constant (1), where it is more than `WIDER`.
+    """
+    averages, out = Averages(found.board, fit.dwell_means), {}
+    sigma: Floats | None = None
+    for column in columns:
+        own = found.candidate(found.told.members[found.place_of(column)][0]).coefficient
+        known = found.given(k for k in found.held if found.candidate(k).coefficient == own)
+        sigma = _sigma(averages.of(found)) if sigma is None else sigma
+        ratio = sigma / _sigma(averages.of(known))
+        names = found.board.evidence.names[: len(ratio)]
+        out[column] = tuple((names[k], float(ratio[k])) for k in np.argsort(-ratio).tolist() if ratio[k] > WIDER)
+    return out
+
+
+def _sigma(moments: Moments) -> Floats:
+    """Sigmas (SI), shape (q,)."""
+    return np.asarray(np.sqrt(np.diag(moments.covariance)))
 
 
 def none_below_zero(difference: Floats, sigma: Floats) -> Floats:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.averaged import widened_by
 from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift, coefficient_shifts
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
@@ -53,6 +54,8 @@ class Found:
     together : tuple of (str, str, float)
         Labels of two effects that together show as this one does, to rounding, and the probability that both are
         there.
+    widened : tuple of (str, float)
+        Coefficients with their sigma over that if it were known to be this effect, as of `widened_by`.
     of_family : float
         Probability that its family is missing on its sensor, as often as it is told there; NaN where no probabilities
         were worked out.
@@ -74,6 +77,7 @@ class Found:
     may_be: tuple[Share, ...] = ()
     of_family: float = float("nan")
     together: tuple[tuple[str, str, float], ...] = ()
+    widened: tuple[tuple[str, float], ...] = ()
 
     @property
     def decided(self) -> bool:
@@ -95,7 +99,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
     whole = max(misfit[0], 1e-9) if misfit else 1.0
     values, sigmas = _estimates(d, problem, chosen)
     allowed = looked_at(d)
-    held_out = _held_out(d, len(chosen))
+    held_out, wider = _held_out(d, len(chosen)), _widened(d, chosen)
     out = []
     for k, column in enumerate(chosen):
         scanned = problem.scan(chosen[:k])
@@ -121,6 +125,7 @@ def found_effects(d: Diagnosis) -> tuple[Found, ...]:
                 may_be=shares,
                 of_family=_of_family(d, column),
                 together=_together(d, column),
+                widened=wider.get(column, ()),
             )
         )
     return tuple(out)
@@ -133,6 +138,12 @@ def _together(d: Diagnosis, column: int) -> tuple[tuple[str, str, float], ...]:
         return ()
     pairs = window.together(window.place_of(column))
     return tuple((window.candidate(one).label, window.candidate(other).label, p) for one, other, p in pairs)
+
+
+def _widened(d: Diagnosis, chosen: list[int]) -> dict[int, tuple[tuple[str, float], ...]]:
+    """Coefficients that are known less well because the class of a chosen column is open, with the ratio of sigmas."""
+    window = d.found.posterior
+    return {} if window is None else widened_by(d.fit, window, (k for k in chosen if len(d.may_be(k)[1]) > 1))
 
 
 def _of_family(d: Diagnosis, column: int) -> float:

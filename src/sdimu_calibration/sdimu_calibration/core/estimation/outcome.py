@@ -21,7 +21,7 @@ from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 _ONE = 0.9995
 """Correlation (1) from which two coefficients are one: each then has thirty times the sigma it would have alone."""
-_TOLD = 1.2
+WIDER = 1.2
 """Ratio of a sigma to the one if the model is right, from which a note reports it: less is seen in no use of it."""
 
 
@@ -120,7 +120,7 @@ def doubted(result: Calibration, values: Floats, covariance: Floats) -> Calibrat
         "sigmas hold for the models that the data leave open, too: that of "
         f"{result.names[worst]} is {ratio[worst]:.1f} times what it would be if this model were known to be right"
     )
-    told = (note,) if ratio[worst] > _TOLD else ()
+    told = (note,) if ratio[worst] > WIDER else ()
     return replace(
         result, values=values, covariance=covariance, conditional_sigma=conditional, notes=(*result.notes, *told)
     )

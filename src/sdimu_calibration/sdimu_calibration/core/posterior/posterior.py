@@ -144,6 +144,13 @@ class Posterior(Generic[E]):
         total = {one: self._any_of(numbers) for one, numbers in groups.items()}
         return dict(sorted(total.items(), key=lambda item: (-item[1], item[0])))
 
+    def given(self, numbers: Iterable[int]) -> Posterior[E]:
+        """Keep the models that hold one of some candidates, as if it were known that one of them is there."""
+        holds = self._holds[:, list(numbers)].any(axis=1)
+        share = float(self._weights @ holds)
+        kept = [self.models[k] for k in np.flatnonzero(holds)]
+        return replace(self, models=tuple(replace(m, probability=m.probability / share) for m in kept))
+
     def candidate(self, number: int) -> Candidate:
         """Candidate of a member."""
         return self.board.evidence.candidate(int(self.board.use[number]))

@@ -239,6 +239,7 @@ def candidate(f: Found, own: bool) -> dict[str, Any]:
         **entry(f, "held_out_rms_before=held_out_before held_out_rms_after=held_out_after"),
         "indistinguishable_from": list(f.alike),
         "depends_on_choice": [entry(s, "instead=other coefficient sigmas") for s in f.coefficient_shifts],
+        "wider": [{"coefficient": name, "factor": factor} for name, factor in f.widened],
     }
 
 
