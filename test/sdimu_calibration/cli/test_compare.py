@@ -75,6 +75,13 @@ def test_the_ladder_shows_what_was_added_and_how_far_the_error_fell(run):
     assert "accel_bias_y" not in line  # moved by one sigma only
 
 
+def test_it_is_said_of_what_the_sigmas_behind_amounts_are(run):
+    """A diagnosis states 1.5 ppm where a fit of the same model states 0.9, and both were called by one word."""
+    told = "one sigma if the model of the line is right; of a diagnosis, one sigma over all models that the data leave"
+    assert told in run(FIRST, SECOND)[1]
+    assert told not in run(FIRST, replace(SECOND, values=FIRST.values))[1]
+
+
 def test_movement_counts_in_sigmas_of_the_model_before():
     assert moved_coefficients(FIRST, SECOND, least=0.5) == (
         ("accel_bias_x", pytest.approx(5.0)),

@@ -12,6 +12,7 @@ from sdimu_calibration.cli.console import plain
 from sdimu_calibration.cli.diagnosis_text import (
     CANDIDATE_HEADINGS,
     candidate_rows,
+    cost_lines,
     print_summary,
     smallest,
     step_lines,
@@ -72,6 +73,7 @@ def test_metres_and_the_worst_coefficient_are_told_before_the_held_out_error(sum
         for words in ("min without aid", "wrong without it: ", "held-out error")
     )
     assert 0 < metres < wrong < held_out
+    assert cost_lines(summary, more)[-1].endswith("+-: one sigma over all models that the data leave open")
     for gone in ("explains", "p of the model", "a third at a time"):
         assert not any(gone in line for line in lines)
 

@@ -16,7 +16,7 @@ from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
-from sdimu_calibration.report.cost import in_use, wrong_without
+from sdimu_calibration.report.cost import OVER_MODELS, in_use, wrong_without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,7 +76,7 @@ def cost_lines(summary: DiagnosisSummary, more: ReportExtras | None) -> list[str
     off = wrong_without(summary, more)
     if off:
         rest = f" and {len(off) - _WORST} more" if len(off) > _WORST else ""
-        lines.append(f"wrong without it: {', '.join(one.text for one in off[:_WORST])}{rest}")
+        lines.append(f"wrong without it: {', '.join(one.text for one in off[:_WORST])}{rest}; +-: {OVER_MODELS}")
     return lines
 
 

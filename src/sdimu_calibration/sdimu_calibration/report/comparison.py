@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from sdimu_calibration.core.error_figures import (
     held_out_judged,
@@ -16,7 +17,7 @@ from sdimu_calibration.core.error_figures import (
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.cost import coefficients_off
+from sdimu_calibration.report.cost import OVER_MODELS, coefficients_off
 
 _HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "wrong without it")
 _NOISE = "noise learned"
@@ -31,6 +32,7 @@ _IN_WHITE = (
     "nis and held-out: in white noise, in which models compare; where noise was learned, 1 is "
     "right for the error in that noise"
 )
+_SIGMAS = f"+-: one sigma if the model of the line is right; of a diagnosis, {OVER_MODELS}"
 _MOST_MOVED = 6
 
 
@@ -63,6 +65,7 @@ def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
         *([_OTHER_STOPS] if any(_differ(result, results[0], "stops") for result in results[1:]) else []),
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
         *([_IN_WHITE] if any(map(noise_learned, results)) else []),
+        *([_SIGMAS] if any(coefficients_off(*two) for two in pairwise(results)) else []),
         *([_BY_HAND] if all(handheld) else [_TWO_KINDS] if any(handheld) else []),
     )
 

@@ -24,6 +24,8 @@ _CHANCE = 3.0
 """Error of position over its predicted sigma (1) from which it is no chance, of one stretch or two."""
 _NOT_HELD = "what was found does not hold where it was not fitted"
 """What is said where a navigation without aid contradicts what was found."""
+OVER_MODELS = "one sigma over all models that the data leave open"
+"""What a diagnosis states behind an amount: larger than that of one model where several are open."""
 _WHOLE_M = 10.0
 """Distance (m) from which metres have no decimals: a tenth of less is still seen."""
 
