@@ -10,6 +10,7 @@ import pytest
 
 from sdimu_calibration.api.fitted import Fitted
 from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis
+from sdimu_calibration.core.diagnosis.alarms import Alarm
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, p_value
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.diagnosis.verdict import error_falls
@@ -19,7 +20,7 @@ from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
 from sdimu_calibration.core.note import Topic
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.report import first_screen, sections
+from sdimu_calibration.report import data, evidence_figures, first_screen, sections
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.storage.files.result_file import as_note
@@ -100,6 +101,25 @@ def test_the_heat_map_says_in_which_noise_its_sigmas_are(learned, diagnosis):
     assert "white noise" in drawn
     assert "is chance" not in drawn
     assert "is chance" in sections.heat_maps(diagnosis, no_figure)
+
+
+def test_under_a_misfit_a_cell_beyond_three_counts(learned):
+    """The page said that the model is wrong, and below that its cells prove nothing."""
+    assert "no cell by itself" in sections.heat_maps(learned, no_figure)
+    wrong = sections.heat_maps(replace(learned, alarms=frozenset({Alarm.NIS})), no_figure)
+    said = as_note("the model in white noise does not fit (NIS 3.1); run: sdimu diagnose")
+    of_fit = page(replace(learned.after, warnings=(said,)), Contents("x", fit=learned.fit))
+    for text in (wrong, of_fit):
+        assert "It counts beyond 3: the noise that was learned stands for what is missing" in text
+        assert "no cell by itself" not in text
+
+
+def test_the_colours_of_a_map_have_the_number_from_which_a_cell_counts(diagnosis):
+    (drawn,) = evidence_figures.heat_map(data.where(diagnosis.consistency)).data
+    beside = drawn["colorbar"]
+    assert {-data.NOTABLE, data.NOTABLE, drawn["zmin"], drawn["zmax"]} <= set(beside["tickvals"])
+    assert len(beside["ticktext"]) == len(beside["tickvals"])
+    assert "beyond 3:" in sections.heat_maps(diagnosis, no_figure)
 
 
 def test_nothing_is_shown_with_what_was_found_where_nothing_was(learned, diagnosis):

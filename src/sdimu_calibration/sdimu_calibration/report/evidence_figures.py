@@ -15,6 +15,17 @@ from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
 """Sigmas at which the colour of a heat map is full."""
+_TICKS = {
+    "tickvals": [-_FULL, -data.NOTABLE, 0.0, data.NOTABLE, _FULL],
+    "ticktext": [
+        f"\N{LESS-THAN OR EQUAL TO} \N{MINUS SIGN}{_FULL:.0f}",
+        f"\N{MINUS SIGN}{data.NOTABLE:.0f}",
+        "0",
+        f"+{data.NOTABLE:.0f}",
+        f"\N{GREATER-THAN OR EQUAL TO} +{_FULL:.0f}",
+    ],
+}
+"""Numbers beside the colours of a heat map: from which size a cell counts, and where the colour is full."""
 _MOST_NUMBERED = 40
 """Stops up to which there is room for numbers in the cells."""
 _MOST_BARS = 24
@@ -69,7 +80,7 @@ def deviates(
         colorscale=list(DIVERGING),
         xgap=2,
         ygap=2,
-        colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12},
+        colorbar={"title": {"text": _ABOVE.format("sigma"), "side": "top"}, "thickness": 12, **_TICKS},
         hovertemplate=f"%{{y}} at {column} %{{x}}: %{{z:+.1f}} sigma<extra></extra>",
     )
     figure.x_axes(title=column, type="category", showgrid=False, ticks="")

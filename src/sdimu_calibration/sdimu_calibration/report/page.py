@@ -151,8 +151,8 @@ def _first(calibration: Calibration, contents: Contents, fit: Fit | None, draw: 
         return first_screen.render(verdict, maps)
     if of_set is not None:
         return first_screen.render(first_screen.of_set(of_set, spell))
-    learned = bool(calibration.noise)
-    maps = sections.heat_map_card([fit.consistency()], draw, learned) if isinstance(fit, NavigationFit) else ""
+    caption = sections.caption_of_map(bool(calibration.noise), bool(calibration.misfits))
+    maps = sections.heat_map_card([fit.consistency()], draw, caption) if isinstance(fit, NavigationFit) else ""
     return first_screen.render(first_screen.of_fit(calibration, spell), maps)
 
 

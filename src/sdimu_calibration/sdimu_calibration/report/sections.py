@@ -290,23 +290,35 @@ def heat_maps(diagnosis: Diagnosis, draw: Draw) -> str:
     fits = [diagnosis.fit, diagnosis.extended] if len(diagnosis.found.chosen) else [diagnosis.fit]
     if diagnosis.fit.learns_scatter:
         return ""
-    return heat_map_card([fit.consistency() for fit in fits], draw, bool(diagnosis.found.noise))
+    caption = caption_of_map(bool(diagnosis.found.noise), diagnosis.unexplained)
+    return heat_map_card([fit.consistency() for fit in fits], draw, caption)
 
 
-_CELLS = "Mean innovation over its sigma, as the test went on: of 200 cells, one beyond 3 is chance."
-_WHITE_CELLS = (
-    "Mean innovation over its sigma in white noise, as the test went on. The noise that was "
-    "learned is not in that sigma: cells beyond 3 are no proof of missing physics here."
-)
+_CELL = "A cell is the mean innovation of a channel at a stop, over its sigma"
 
 
-def heat_map_card(found: Sequence[Consistency], draw: Draw, learned: bool) -> str:
-    """Return a card with the heat map of each check, one at a time; `learned`: noise with a memory was."""
+def caption_of_map(learned: bool, misfit: bool) -> str:
+    """Say what a cell of a heat map is, and when it counts.
+
+    `learned`: noise with a memory was, which is not in the sigma of a cell; `misfit`: the model does not fit, so that
+    this noise stands for what is missing.
+    """
+    if not learned:
+        return f"{_CELL}. It counts beyond {data.NOTABLE:.0f}: of 200 cells, one is chance."
+    if misfit:
+        why = "the noise that was learned stands for what is missing, and excuses no cell"
+        return f"{_CELL} in white noise. It counts beyond {data.NOTABLE:.0f}: {why}."
+    why = "The noise that was learned makes cells larger, too: here the verdict counts, and no cell by itself"
+    return f"{_CELL} in white noise. {why}."
+
+
+def heat_map_card(found: Sequence[Consistency], draw: Draw, caption: str) -> str:
+    """Return a card with the heat map of each check, one at a time."""
     figure = evidence_figures.heat_maps([data.where(one) for one in found])
     return (
         '<section class="card"><h2>Where it fails: channel by stop</h2>'
         + switched(draw(figure), ("model as given", "with what was found")[: len(found)])
-        + quiet(_WHITE_CELLS if learned else _CELLS)
+        + quiet(caption)
         + "</section>"
     )
 
