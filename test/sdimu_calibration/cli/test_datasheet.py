@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ import pytest
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.core.fleet.datasheet import known_terms
 from sdimu_calibration.core.noise import Terms
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.limits_file import read_limits
 from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms, write_noise_terms
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 
 
 def written(folder):
@@ -65,6 +68,20 @@ def test_a_sheet_that_is_held_against_nothing_has_no_column_for_it(batch, tmp_pa
     limits.write_text("format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n")
     datasheet([folder], limits=limits)
     assert re.search(r"Pass: the whole.*<th[^>]*>limit</th>", (folder / "datasheet.html").read_text(), re.DOTALL)
+
+
+def test_the_title_names_the_serial_number_and_calls_no_folder_one(batch):
+    folder = batch(units=6)
+    datasheet([folder])
+    assert "<h1>Data sheet: dtg, 6 units: SN0, SN1, SN2, SN3 and others</h1>" in (folder / "datasheet.html").read_text()
+    datasheet([folder], serial="SN1")
+    assert "<h1>Data sheet: dtg, serial SN1</h1>" in (folder / "datasheet.html").read_text()
+    alone = folder / "unit2_0"
+    write_result(alone / "result.json", replace(read_result(alone), origin=Origin(imu="dtg")))
+    datasheet([alone], certificate=True)
+    page = (alone / "datasheet.html").read_text()
+    assert "<h1>Calibration certificate: dtg, unit unit2_0 (no serial stated)</h1>" in page
+    assert json.loads((alone / "datasheet.json").read_text())["serial"] == ""
 
 
 def test_the_certificate_is_of_one_unit_with_the_hashes_of_its_recordings(batch, tmp_path, capsys):

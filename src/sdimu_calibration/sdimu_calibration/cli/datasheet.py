@@ -73,7 +73,8 @@ def datasheet(
     lines = core.datasheet([core.Sample(entry.unit, entry.result) for entry in entries], rests)
     lines = tuple(line.against(allowed[line.term]) if line.term in allowed else line for line in lines)
     about = Certificate(
-        serial=entries[0].unit if certified.certificate else certified.serial or "",
+        # The name of a folder, by which a unit without a serial goes, is none.
+        serial=entries[0].result.origin.serial if len({entry.unit for entry in entries}) == 1 else "",
         date=datetime.now(UTC).strftime("%Y-%m-%d"),
         operator=certified.operator,
         plan=certified.plan,

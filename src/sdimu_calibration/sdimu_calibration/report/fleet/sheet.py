@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 
 from sdimu_calibration.core.fleet.sheet import FAIL, NOT_MEASURED, PASS, UNDECIDED, Line
+from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.fleet.tables import three
@@ -63,9 +64,7 @@ def write_page(
     recordings and room for signatures.
     """
     imu = entries[0].result.origin.imu or "IMU"
-    units = list(dict.fromkeys(entry.unit for entry in entries))
-    of = about.serial or (units[0] if len(units) == 1 else f"{len(units)} units")
-    title = f"{'Calibration certificate' if certificate else 'Data sheet'}: {imu}, {of}"
+    title = f"{'Calibration certificate' if certificate else 'Data sheet'}: {imu}, {_which(about, entries)}"
     parts = [
         _table(lines),
         _coefficients(entries) if certificate else "",
@@ -75,6 +74,18 @@ def write_page(
     ]
     body = "\n".join(part for part in (_head(about, entries), _conditions(lines), _verdict(lines), *parts) if part)
     write_whole(path, document(title, body, style=_SHEET_STYLE))
+
+
+_NAMED = 4
+"""Number of units that the title names: more do not fit into it."""
+
+
+def _which(about: Certificate, entries: Sequence[Entry]) -> str:
+    """Name the units: the serial number where one is known, else the name of the result."""
+    units = list(dict.fromkeys(entry.unit for entry in entries))
+    if len(units) > 1:
+        return f"{len(units)} units: {first_of(units, _NAMED)}"
+    return f"serial {about.serial}" if about.serial else f"unit {units[0]} (no serial stated)"
 
 
 def _head(about: Certificate, entries: Sequence[Entry]) -> str:
