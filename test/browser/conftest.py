@@ -180,6 +180,29 @@ def crossing_labels(page: Any) -> list[str]:
     return found
 
 
+WIDE_4K = {"width": 3840, "height": 2160}
+"""A screen of 4K (px)."""
+LEAST_PX = 12
+"""Height of letters (px) below which nobody reads them on a screen of 4K."""
+_UNFIT = """least => {
+    const words = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+    for (let node = words.nextNode(); node; node = words.nextNode()) {
+        const at = node.parentElement, seen = node.textContent.trim() && at.getClientRects().length;
+        const size = parseFloat(getComputedStyle(at).fontSize);
+        if (seen && size < least) { found.push(`${size} px: ${node.textContent.trim().slice(0, 40)}`); }
+    }
+    const wide = Array.from(document.querySelectorAll('html, .card')).filter(e => e.scrollWidth > e.clientWidth + 1);
+    return found.concat(wide.map(e => `wider than its place: ${e.tagName} ${e.id} ${e.textContent.slice(0, 40)}`));
+}"""
+"""What is written in smaller letters than `least` (px), and what is wider than its place."""
+
+
+def unfit(page: Any) -> list[str]:
+    """Name what is too small to read on a screen of 4K, and what runs out of its place."""
+    found: list[str] = page.evaluate(_UNFIT, LEAST_PX)
+    return found
+
+
 _SEEN = """number => {
     const seen = document.querySelector('#ranking .js-plotly-plot')._hoverdata;
     return Boolean(seen) && seen[0].pointNumber === number;

@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.cli.fleet import fleet
 
-from .conftest import crossing_labels
+from .conftest import WIDE_4K, crossing_labels, unfit
 
 SHEET_PX = 703
 """Width of A4 less the margins of the pages (186 mm) at 96 dots an inch."""
@@ -87,3 +87,12 @@ def test_verdict_and_limits_are_on_the_first_screen_and_nothing_is_wider_than_a_
     told = opened.locator(".verdict li")
     assert told.all_inner_texts()[1].startswith("pass gyro bias")
     assert told.last.evaluate("item => item.getBoundingClientRect().bottom") < 400
+
+
+def test_on_a_screen_of_4k_every_word_of_a_data_sheet_is_read_and_in_its_place(batch, opened):
+    folder = batch(units=1, each=3)
+    datasheet([folder], certificate=True, operator="A. Person")
+    opened.set_viewport_size(WIDE_4K)
+    opened.goto(f"file://{folder / 'datasheet.html'}")
+    assert unfit(opened) == []
+    assert opened.faults == []

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import re
+import subprocess
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from plans import HIDDEN
 
+from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.table import with_sigma
+
 from .bench_page import add_first, choose, click_cell, drawn, held_out, text
-from .conftest import DWELL_S, click_bar, settle
+from .conftest import DWELL_S, START_S, WIDE_4K, Workbench, click_bar, sdimu, settle, unfit
 
 
 def test_a_click_on_a_cell_shows_that_stop_and_channel(visit: Callable[[], Any]) -> None:
@@ -104,6 +110,43 @@ def test_ranking_heat_map_residuals_and_ladder_stand_in_one_view(visit: Callable
         page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
         settle(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_on_a_screen_of_4k_every_word_is_read_and_in_its_place(visit: Callable[[], Any]) -> None:
+    page = visit()
+    page.set_viewport_size(WIDE_4K)
+    # Figures are drawn anew by the server, which knows the new size a moment later.
+    larger = "name => parseFloat(getComputedStyle(document.querySelector(`#${name} .xtitle`)).fontSize) > 16"
+    for name in ("heat", "ranking", "residuals", "ladder"):
+        page.wait_for_function(larger, arg=name)
+    # A key that is pressed while candidates are looked for is lost.
+    settle(page)
+    page.keyboard.press("j")
+    page.locator("#candidate-name").wait_for()
+    settle(page)
+    assert unfit(page) == []
+
+
+def test_a_click_on_a_candidate_shows_the_numbers_of_the_shell(
+    visit: Callable[[], Any], workbench: Workbench, tmp_path: Path
+) -> None:
+    command = sdimu("diagnose", workbench.bag, "--out", tmp_path)
+    subprocess.run(command, check=True, capture_output=True, timeout=START_S)
+    told = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
+    (step,) = told["ladder"]
+    (found,) = told["candidates"]
+    page = visit()
+    click_bar(page, 0)
+    page.locator("#candidate-name").wait_for()
+    settle(page)
+    said = text(page, "preview")
+    unit = found["parameters"][0]["display_unit"]
+    estimate, sigma = (from_si(step[key], unit) for key in ("estimate", "sigma"))
+    assert f"{step['label']}: {with_sigma(estimate, sigma, unit)}, {step['z']:+.1f} sigma" in said
+    errors = (f"{step[f'one_stop_out_{when}']:.3f}" for when in ("before", "after"))
+    assert " \N{RIGHTWARDS ARROW} ".join(errors) in said
+    sentence = text(page, "verdict").replace("\N{NO-BREAK SPACE}", " ").replace("\N{PLUS-MINUS SIGN}", "+-")
+    assert told["sentence"] in sentence
 
 
 def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Callable[[], Any]) -> None:

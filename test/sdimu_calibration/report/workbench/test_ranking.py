@@ -26,3 +26,12 @@ def test_a_bar_of_look_alikes_has_its_probability_whatever_time_constant_scores_
     assert figure.data[0]["y"] == [label]
     assert figure.data[0]["text"] == ["85 %"]
     assert "gyro_bias_ramp_x 15 %" in figure.data[0]["customdata"][0]
+
+
+def test_the_words_in_a_bar_grow_with_the_screen():
+    """On a screen of 4K they had eleven pixels, beside names of eighteen."""
+    label = "gyro_scale_asymmetry_y"
+    entries = [Scored(label, "", "ppm", 9.0, 9.0, 1.0, 0.1, 1.0, 1.0, 1.0, chosen=False)]
+    figure = figures.ranking(entries, 4.1, {label: {label: "85 %", "gyro_scale_quadratic_y": "15 %"}})
+    small, large = (figures.finished(figure, {"scale": scale}).data[0].textfont.size for scale in (1.0, 1.6))
+    assert large == 1.6 * small

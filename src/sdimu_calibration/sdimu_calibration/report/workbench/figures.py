@@ -23,6 +23,8 @@ _CELL = 10
 _MOST_NUMBERED = 20
 """Number of stops whose numbers stand beside each other in the column of the heat map on a screen of 1440."""
 _MOST_BARS = 14
+_BAR_FONT = 11
+"""Size of the words in a bar (px): they are no higher than it."""
 _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 
 
@@ -79,7 +81,7 @@ def ranking(
         "textposition": "inside",
         "insidetextanchor": "start",
         "textangle": 0,
-        "textfont": {"color": INK, "size": 11},
+        "textfont": {"color": INK, "size": _BAR_FONT},
     }
     # The names leave a narrow axis, for which the title of the report is too long.
     figure.x_axes(title="|z| (sigma)", nticks=4, range=[0, 1.05 * max([*bars["x"], threshold])])
@@ -227,6 +229,7 @@ def finished(figure: Figure, look: Any) -> Any:
     if made.layout.title.text:
         made.update_layout(title_font_size=14 * scale)
     made.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
+    made.update_traces(textfont_size=_BAR_FONT * scale, selector={"type": "bar"})
     made.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
     made.update_annotations(font_size=_FONT * scale)
     made.update_yaxes(tickfont_size=11 * scale)
