@@ -67,18 +67,10 @@ test: check-style
 test-run: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench"
 
-# What linear algebra decides is tested with other kernels of OpenBLAS (without AVX), too: no test stands on the last digits
-# of a library. Its quick tests run in `make test` as well, its long ones with these kernels alone.
-NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain.py diagnosis/test_diagnose.py \
-    estimation/test_inseparable.py estimation/test_prior_check.py evidence/test_influence.py evidence/test_signatures.py \
-    filter/test_kalman.py fleet/test_population.py fleet/test_reml.py joint/test_combine.py joint/test_held_out.py \
-    joint/test_reduction.py plan_search/test_known.py planning/test_observability.py test_probability.py)
-NUMERICAL_LIVE := test/ros/test_live_diagnosis.py::test_what_is_missing_stands_out_and_leaves_when_it_is_added
-
 # The rest of what must hold (test/tiers.py): tutorials, browser, faults, damaged files, nodes over DDS, campaigns.
 # Nodes wait for each other more than they work: they run beside what keeps both cores busy.
 thorough: setup
-	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest other-blas
+	$(MAKE) --no-print-directory -j 2 --output-sync=target thorough-nodes thorough-rest
 
 thorough-nodes thorough-rest: export OPENBLAS_CORETYPE = Haswell
 # Targets that run side by side, each in ROS domains of its own; a run that looks for a free domain takes none of these.
@@ -91,12 +83,18 @@ thorough-nodes: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book
 
 thorough-rest: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench" \
-	    $(addprefix --ignore=,$(NUMERICAL))
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
+
+# What linear algebra decides, with other kernels of OpenBLAS (without AVX) than in `test` and `thorough`: no test stands on
+# the last digits of a library. The quick tests alone: the long ones hold with the kernels that users have.
+NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain.py diagnosis/test_diagnose.py \
+    estimation/test_inseparable.py estimation/test_prior_check.py evidence/test_influence.py evidence/test_signatures.py \
+    filter/test_kalman.py fleet/test_population.py fleet/test_reml.py joint/test_combine.py joint/test_held_out.py \
+    joint/test_reduction.py plan_search/test_known.py planning/test_observability.py test_probability.py)
 
 other-blas: export OPENBLAS_CORETYPE = Nehalem
 other-blas: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not bench" $(NUMERICAL) $(NUMERICAL_LIVE)
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench" $(NUMERICAL)
 
 # As a user of ROS would: build the three packages, test what was installed, and run a launch file of it outside the
 # repository (by the stand-in for ros2/launch, which is no wheel). Its test of 19 s runs the loops as Python: to compile

@@ -61,7 +61,10 @@ def numeric_constants(path: Path) -> Iterator[tuple[str, str, str]]:
 
 def is_numeric(value: ast.expr) -> bool:
     """Tell a number, a formula or an array of numbers from a row of indices that names columns."""
-    if isinstance(value, ast.Call) and not ast.unparse(value.func).startswith(("np.", "math.")):
+    if isinstance(value, ast.Dict):
+        # Rows of several numbers name places and signs.
+        return bool(value.values) and all(is_numeric(one) and not isinstance(one, ast.Tuple) for one in value.values)
+    if isinstance(value, ast.Call) and not ast.unparse(value.func).startswith(("np.", "math.", "float")):
         return False
     if not isinstance(value, ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple | ast.Call):
         return False

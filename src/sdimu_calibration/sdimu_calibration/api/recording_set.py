@@ -17,6 +17,7 @@ from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
 from sdimu_calibration.core.joint.set_verdict import SetFinding
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
@@ -56,7 +57,7 @@ class OpenedSet:
 
     def __repr__(self) -> str:
         """List the recordings, one a line."""
-        lines = [f"{len(self)} recordings of {self.serial or 'a unit without a serial number'}"]
+        lines = [f"{counted(len(self), 'recording')} of {self.serial or 'a unit without a serial number'}"]
         return "\n".join([*lines, *(f"  {m.name}: power-on {m.power_on or 'of its own'}" for m in self.members)])
 
     def _repr_html_(self) -> str:

@@ -49,7 +49,7 @@ def export(
     from sdimu_calibration.storage.bags.file_room import check_file_room
     from sdimu_calibration.storage.export import FORMS
     from sdimu_calibration.storage.export import export as write
-    from sdimu_calibration.storage.files.config import find_config
+    from sdimu_calibration.storage.files.config import find_config, names_of
     from sdimu_calibration.storage.files.effect_file import effect_files, effects_of_result
     from sdimu_calibration.storage.files.result_file import noise_for, read_judged_result
 
@@ -65,6 +65,7 @@ def export(
     sources = [folder / "result.json" if result.is_dir() else result, *effect_files(effect or [])]
     sources += [find_config("imu", imu)] if imu else []
     sources += [Path(calibration.origin.imu_file)] if calibration.origin.imu_file else []
+    sources += [find_config("imu", calibration.origin.imu)] if calibration.origin.imu in names_of("imu") else []
     free = partial(check_file_room, option="--out", kind=kind, replace=replace, sources=sources)
     done = write(form, out or folder / name, calibration, specification, own, rate, temperature, free)
     console = plain()

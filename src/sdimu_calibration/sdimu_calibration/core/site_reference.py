@@ -16,7 +16,8 @@ from sdimu_calibration.core.units import from_si, to_si
 SURVEYED, FROM_MAP, BY_FORMULA = "surveyed", "map", "formula"
 """Words for how something of the site was found."""
 LATITUDE_SIGMAS = {SURVEYED: to_si(1e-6, "deg"), FROM_MAP: to_si(1e-3, "deg")}
-"""Sigma of a geodetic latitude (rad): a satellite receiver in the field knows .1 m, a point on a map some 100 m."""
+"""Sigma of a geodetic latitude (rad): a satellite receiver with a reference station knows .1 m, a point on a map some
+100 m."""
 DEFLECTION_SIGMAS = {FROM_MAP: to_si(1.3, "arcsec"), BY_FORMULA: to_si(10.0, "arcsec")}
 """Sigma of the deflection in the meridian (rad): where the latitude has that of EGM2008 in it, against deflections that
 were observed; and where it is that of the ellipsoid, 6.3 arcsec by the variance of gravity, and more near mountains."""
@@ -24,7 +25,7 @@ GRAVITY_SIGMAS = {SURVEYED: to_si(0.1, "mgal"), FROM_MAP: to_si(5.0, "mgal"), BY
 """Sigma of gravity (m/s^2): a tie by gravimeter, the tide of the Earth not taken out; a map or model of anomalies; the
 normal formula, off by the free-air anomaly, whose mean square over the Earth is 1795 mgal^2."""
 _OF = {"normal": "WGS-84 normal gravity at the latitude", "standard": "a convention, as no site is stated"}
-_OF["geodetic"] = "geodetic, found with the deflection of the vertical"
+_OF["plumb"] = "its sigma has the deflection of the vertical in it"
 """Where a value is from that nobody told, in words."""
 
 
@@ -43,8 +44,8 @@ class Reference:
     unit: str = ""
     display_unit: str = ""
     origin: str = "stated"
-    """``stated``; of gravity also ``normal`` or ``standard``; of a latitude, ``geodetic`` where `sigma` and
-    `value` are those of the astronomic one."""
+    """``stated``; of gravity also ``normal`` or ``standard``; of a latitude ``plumb`` where `sigma` and `value` are
+    those of the plumb line."""
     relative: tuple[str, ...] = ()
     """Coefficients whose common part is the reference: where `sigma` is zero their sigmas are relative to it."""
 
@@ -79,12 +80,12 @@ def relative_line(references: Sequence[Reference]) -> str:
 
 
 def _usually_off(reference: Reference) -> str:
-    """Say by how much a formula is off, and what is relative to it; nothing of a reference that is stated."""
+    """Say by how much a formula is off; nothing of a reference that is stated."""
     if reference.origin != "normal":
         return ""
     off = GRAVITY_SIGMAS[BY_FORMULA]
-    size = f"{from_si(off, 'mgal'):.0f} mgal, {from_si(off / reference.told, 'ppm'):.0f} ppm of them"
-    return f", which is usually off by {size}: state gravity_m_s2, or gravity_sigma: {BY_FORMULA}"
+    size = f"{from_si(off, 'mgal'):.0f} mgal or {from_si(off / reference.told, 'ppm'):.0f} ppm"
+    return f", off by {size} (root mean square over the Earth): state gravity_m_s2, or gravity_sigma: {BY_FORMULA}"
 
 
 def found(references: Sequence[Reference], off: Mapping[str, tuple[float, float]]) -> tuple[Reference, ...]:

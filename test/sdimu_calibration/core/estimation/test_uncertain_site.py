@@ -25,7 +25,7 @@ from sdimu_calibration.core.live import LiveCalibration
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.site_reference import relative_line
 from sdimu_calibration.core.specification import Site
-from sdimu_calibration.core.units import to_si
+from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_sim.core.by_hand import ByHand, by_hand_recording
@@ -119,7 +119,8 @@ def test_a_site_at_its_word_says_what_is_relative_to_it():
     line = relative_line(result.references)
     assert "accel_scale_x, accel_scale_y, accel_scale_z to gravity 9.798288 m/s^2 (WGS-84" in line
     # The root of 1795 mgal^2, and over 979829 mgal.
-    assert line.endswith("usually off by 42 mgal, 43 ppm of them: state gravity_m_s2, or gravity_sigma: formula")
+    assert ", off by 42 mgal or 43 ppm (root mean square over the Earth)" in line
+    assert line.endswith(": state gravity_m_s2, or gravity_sigma: formula")
     assert "\n" not in line
 
 
@@ -135,7 +136,7 @@ def test_a_deflection_of_the_vertical_is_found_as_the_latitude_of_the_plumb_line
     assert abs(off) < 4.0 * latitude.value_sigma < DEFLECTION
     assert latitude.sigma == DEFLECTION
     (note,) = (note for note in found.notes if "was estimated, too" in note)
-    assert "latitude 36.4000 deg (geodetic, found with the deflection of the vertical)" in note
+    assert "latitude 36.4000 deg (its sigma has the deflection of the vertical in it)" in note
     assert "from +- 6 arcmin" in note
     # 27 errors over sigma; with the latitude at its word the Earth's rate that is missing goes into the gyros.
     assert np.sqrt(np.mean(baseline_z(found, truth) ** 2)) < 1.45
@@ -160,7 +161,12 @@ def test_what_is_found_of_the_site_stands_in_the_result_and_its_file(tmp_path):
 def test_a_sigma_that_the_data_contradict_is_warned_of():
     site = replace(off(), latitude_sigma_rad=LATITUDE / 10.0)
     result = outcome(solve(PreparedTest(recorded()[0], IMU, site), MODEL, "filter"), held_out=False)
-    assert any("latitude_sigma of the site" in line and "contradicts the data" in line for line in result.warnings)
+    (line,) = (line for line in result.warnings if "the latitude of the site, told with a sigma of" in line)
+    # What the data say, whatever was told: the fit itself stays near what was told.
+    said = float(line.partition("too large by ")[2].split(" arcmin")[0])
+    off_by, sigma = from_si(LATITUDE, "arcmin"), from_si(LATITUDE, "arcmin") / 10.0
+    assert abs(said - off_by) < 0.2 * off_by
+    assert f"a sigma of {sigma:.3g} arcmin, contradicts the data" in line
 
 
 def test_gravity_by_a_latitude_is_as_uncertain_as_that():
@@ -183,15 +189,18 @@ def test_gravity_goes_with_the_geodetic_part_of_a_latitude_alone():
         return float(np.median((effect.regressors(seen)[:, 3:] / down)[np.abs(down) > 0.1]))
 
     ((whole, _),) = stated_references(replace(SITE, latitude_sigma_rad=3e-4))
-    both = replace(SITE, latitude_sigma_rad=3e-4, deflection_sigma_rad=4e-4)
+    both = replace(SITE, latitude_sigma_rad=3e-4, deflection_sigma_rad=4e-4, gravity_sigma_m_s2=1e-6)
     (latitude, sigma), (gravity, left) = stated_references(both)
     assert (sigma, gravity.name) == (pytest.approx(5e-4), "reference_gravity")
     # Covariance of gravity with the sum is that with the geodetic part, its variance what that part alone gives.
     assert slope_of(latitude) * 25.0 == pytest.approx(slope_of(whole) * 9.0)
-    assert (slope_of(latitude) * 5e-4) ** 2 + left**2 == pytest.approx((slope_of(whole) * 3e-4) ** 2)
+    assert (slope_of(latitude) * 5e-4) ** 2 + left**2 == pytest.approx((slope_of(whole) * 3e-4) ** 2 + 1e-12)
+    # Without a sigma of its own gravity is taken at its word, and what is relative to it is told.
+    ((_, _),) = stated_references(replace(both, gravity_sigma_m_s2=0.0))
     ((alone, size),) = stated_references(replace(SITE, deflection_sigma_rad=4e-4))
     assert ([term.channel for term in alone.terms], size) == ([0, 1, 2], 4e-4)
-    assert [size for _, size in stated_references(replace(both, gravity_m_s2=9.8))] == [pytest.approx(5e-4)]
+    surveyed = stated_references(replace(both, gravity_m_s2=9.8))
+    assert [size for _, size in surveyed] == [pytest.approx(5e-4), 1e-6]
 
 
 def test_the_classical_estimator_says_that_it_takes_the_site_at_its_word():

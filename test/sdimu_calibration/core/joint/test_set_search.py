@@ -11,8 +11,7 @@ import pytest
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.diagnosis.diagnose import climb
-from sdimu_calibration.core.diagnosis.found import DECIDED
-from sdimu_calibration.core.diagnosis.grades import NAMED, without_variant
+from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
@@ -23,6 +22,7 @@ from sdimu_calibration.core.posterior import coefficients
 from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.probability import in_percent
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import load_model
@@ -174,27 +174,9 @@ def test_taking_back_effects_keeps_the_fault_of_one_recording(options):
     assert np.all(np.abs(back.after.estimate.values - found.after.estimate.values) < 0.02 * sigma)
 
 
-@pytest.mark.parametrize("hidden", [(), ("accel_quadratic_x=40 ug/g^2", "accel_cubic_z=60 ug/g^3")])
-def test_a_set_of_one_recording_is_told_as_the_recording_by_itself(options, hidden):
-    (member,) = unit_set(32, [short()], hidden).members
-    together = diagnose_set([member], options, here)
-    alone = climb(solve(member.open(), options.model))
-    assert together.verdict == alone.verdict
-    assert "recordings" not in together.sentence
-    # What is of one recording is of all of them: no change of a coefficient, and no double of an effect.
-    assert not any(f.recording for f in together.findings)
-    told = [without_variant(f.label) for f in together.findings]
-    assert told == [without_variant(f.candidate.label) for f in alone.found_effects]
-    for one, other in zip(together.findings, alone.found_effects, strict=True):
-        assert one.value == pytest.approx(other.value, abs=0.1 * other.sigma)
-        assert one.sigma == pytest.approx(other.sigma, rel=0.1)
-        assert (one.probability > DECIDED) == (other.probability > DECIDED)
-    # A set weighs twelve noises of a recording at most: half a unit of log odds is worth no mention (Jeffreys).
-    p, q = together.probabilities.nothing, alone.probabilities.nothing
-    if hidden:
-        assert max(p, q) < 0.01
-    else:
-        assert abs(math.log(p / (1.0 - p)) - math.log(q / (1.0 - q))) < 0.5
+def test_one_recording_is_no_set_to_diagnose(options):
+    with pytest.raises(DataError, match="a set of one recording: diagnose it by itself"):
+        diagnose_set(unit_set(32, [short()]).members, options, here)
 
 
 def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):

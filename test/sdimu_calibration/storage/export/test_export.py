@@ -18,7 +18,7 @@ from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.results import Calibration, no_history
+from sdimu_calibration.core.results import Calibration, SetSummary, no_history
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.export import FORMS, export
@@ -231,7 +231,8 @@ def test_an_imu_file_has_the_noise_that_the_calibration_learned_and_the_rest_of_
     done = export("imu", tmp_path / "mine.yaml", made, used)
     found, base = load_imu(tmp_path / "mine.yaml"), load_imu("rlg_navigation")
     assert (found.prior, found.grade, found.gyro_white_noise) == (base.prior, base.grade, base.gyro_white_noise)
-    assert from_si(found.accel_white_noise, "ug/sqrt(Hz)") == pytest.approx(12.5)
+    # The white noise of a diagnosis holds what was learned, too: beside that it is the one of the file.
+    assert found.accel_white_noise == pytest.approx(base.accel_white_noise)
     assert from_si(found.gyro_bias_instability, "deg/h") == pytest.approx(0.02)
     assert from_si(found.accel_random_walk, "ug/sqrt(h)") == pytest.approx(30.0)
     # The 2 ug of the data sheet were held against the same data, and a walk was found in their place.
@@ -242,9 +243,11 @@ def test_an_imu_file_has_the_noise_that_the_calibration_learned_and_the_rest_of_
 
 def test_an_imu_file_keeps_the_stated_noise_of_a_triad_of_which_nothing_was_learned(tmp_path: Path) -> None:
     base = load_imu("rlg_navigation")
-    export("imu", tmp_path / "mine.yaml", replace(result(*BASELINE), noise=LEARNED[1:]), base)
+    used = replace(base, gyro_white_noise=2.0 * base.gyro_white_noise)
+    export("imu", tmp_path / "mine.yaml", replace(result(*BASELINE), noise=LEARNED[2:]), used)
     found = load_imu(tmp_path / "mine.yaml")
     assert found.gyro_bias_instability == pytest.approx(base.gyro_bias_instability)
+    assert found.gyro_white_noise == pytest.approx(2.0 * base.gyro_white_noise)
     assert found.accel_bias_instability == 0.0
 
 
@@ -258,6 +261,20 @@ def test_markov_noise_that_may_be_flicker_is_stated_as_that(tmp_path: Path) -> N
     largest = np.sqrt(np.max(size**2 / x * 2.0 * (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x))))
     expected = np.hypot(LEARNED[0].size, largest / np.sqrt(2.0 * np.log(2.0) / np.pi))
     assert load_imu(tmp_path / "mine.yaml").gyro_bias_instability == pytest.approx(expected, rel=5e-3)
+
+
+def test_an_imu_file_says_that_it_holds_nothing_of_what_was_learned(tmp_path: Path) -> None:
+    drawn = NoiseTerm("accel", "stop", size=to_si(60.0, "ug"))
+    for noise, said in (((drawn,), "learned: none that a file states."), ((), "learned: none.")):
+        made = replace(result(*BASELINE), noise=noise)
+        export("imu", tmp_path / f"{len(noise)}.yaml", made, load_imu("rlg_navigation"))
+        assert said in (tmp_path / f"{len(noise)}.yaml").read_text()
+
+
+def test_an_imu_file_of_a_set_is_refused(tmp_path: Path) -> None:
+    made = replace(result(*BASELINE), of_set=SetSummary((), (), (), np.ones(1), ()))
+    with pytest.raises(DataError, match=r"each recording of a set has noise of its own.*export that of one"):
+        export("imu", tmp_path / "mine.yaml", made, load_imu("rlg_navigation"))
 
 
 def test_an_imu_file_of_a_result_that_names_none_asks_for_one(tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ from sdimu_calibration.core.units import STANDARD_GRAVITY, parse_unit
 from sdimu_calibration.core.wording import Option, Work
 
 DEGREE = float(np.pi / 180.0)
+"""A degree (rad): what a driver of deg/s is off by."""
 _NEAR_GRAVITY = 0.3
 """The median of |f| may differ from gravity by this share: nominal scale and bias of raw counts err so much."""
 _OTHER_UNITS = ("mg", "ug", "cm/s^2", "mm/s^2")

@@ -19,7 +19,7 @@ from sdimu_calibration.core.recording import UNNUMBERED, PhaseLog, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 
 _WIDE = float(np.radians(0.1))
-"""A limit of rest beyond this (rad/s) may let a slow turn pass."""
+"""Limit of rest (rad/s): beyond it a slow turn may pass for a rest."""
 _WINDOW_S = 0.5
 """Length of a window (s): long enough for a mean, short against a rest."""
 _SHORTEST_S = 2.0

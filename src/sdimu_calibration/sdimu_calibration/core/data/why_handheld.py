@@ -21,8 +21,8 @@ _TURNS = np.radians(0.5)
 _NOISE = 20.0
 """Ratio of a mean rate to its noise from which it shows an axis: its direction is then known to 3 deg."""
 _STAYS = float(np.cos(np.radians(5.0)))
-"""Cosine of the angle between the axes of neighbouring windows below which the axis moved: flexible tables move it by
-2 deg."""
+"""Cosine (1) of the angle between the axes of neighbouring windows below which the axis moved: flexible tables move it
+by 2 deg."""
 _OF_A_TABLE = 0.6
 """Share of neighbouring windows whose axis stays: tables have .99, hands .1 to .3."""
 _FEWEST = 12

@@ -96,8 +96,8 @@ LATITUDE = register(
 )
 
 
-SITE_REFERENCES = (LATITUDE.name, GRAVITY.name)
-"""Names of the parameters of what a site tells."""
+SITE_REFERENCES = {LATITUDE.name: "arcmin", GRAVITY.name: "mgal"}
+"""Names of the parameters of what a site tells, with the unit in which people read what they are off by."""
 _RELATIVE = {
     LATITUDE.name: tuple(p.name for p in GYRO_MASS_UNBALANCE.parameters if p.name.rpartition("_")[2][0] == "d"),
     GRAVITY.name: ACCEL_SCALE.labels,
@@ -115,14 +115,14 @@ def told_of(site: Site | None, names: Sequence[str]) -> tuple[Reference, ...]:
     def one(effect: Effect, told: float, sigma: float, origin: str) -> Reference:
         (parameter,) = effect.parameters
         relative = tuple(name for name in _RELATIVE[effect.name] if name in names)
-        units = parameter.unit, "arcmin" if effect is LATITUDE else "mgal"
+        units = parameter.unit, SITE_REFERENCES[parameter.name]
         return Reference(parameter.name, told, sigma, told, sigma, *units, origin, relative)
 
     if site is None:
         return (one(GRAVITY, STANDARD_GRAVITY, 0.0, "standard"),)
     normal = float(earth.normal_gravity(site.latitude_rad, site.height_m))
     gravity, origin = (site.gravity_m_s2, "stated") if site.gravity_m_s2 else (normal, "normal")
-    latitude = "geodetic" if site.deflection_sigma_rad else "stated"
+    latitude = "plumb" if site.deflection_sigma_rad else "stated"
     return (
         one(LATITUDE, site.latitude_rad, site.astronomic_latitude_sigma_rad, latitude),
         one(GRAVITY, gravity, site.gravity_sigma_m_s2, origin),
@@ -141,11 +141,12 @@ def stated_references(site: Site) -> tuple[tuple[Effect, float], ...]:
     latitude, sigma = LATITUDE, site.astronomic_latitude_sigma_rad
     gravity = site.gravity_sigma_m_s2
     if sigma and not site.gravity_m_s2:
-        # Normal gravity goes with the geodetic part of the error alone: what the sum of both says of that part, and
-        # what it leaves open of it.
+        # Normal gravity goes with the geodetic part of the error alone: what the sum of both says of that part.
         part, slope = (site.latitude_sigma_rad / sigma) ** 2, _slope(site)
         latitude = _with_gravity(part * slope)
-        gravity = float(np.hypot(gravity, slope * site.latitude_sigma_rad * site.deflection_sigma_rad / sigma))
+        if gravity:
+            # What it leaves open of that part. A gravity that is taken at its word stays so, and is told as that.
+            gravity = float(np.hypot(gravity, slope * site.latitude_sigma_rad * site.deflection_sigma_rad / sigma))
     return tuple((effect, size) for effect, size in ((latitude, sigma), (GRAVITY, gravity)) if size > 0.0)
 
 

@@ -80,7 +80,11 @@ def checksum(*arrays: Floats) -> float:
 def conditions(setup: TestSetup) -> float:
     """Give a number that another site or other noise densities do not have: they change what a likelihood means."""
     site, imu = setup.site, setup.imu
-    place = (site.latitude_rad, site.height_m, setup.gravity, *site.sigmas.values())
+    sigmas = tuple(v for v in (site.latitude_sigma_rad, site.gravity_sigma_m_s2) if v)
+    if site.deflection_sigma_rad:
+        # Beside what files of before hold: each in a place of its own.
+        sigmas = (site.latitude_sigma_rad, site.gravity_sigma_m_s2, site.deflection_sigma_rad)
+    place = (site.latitude_rad, site.height_m, setup.gravity, *sigmas)
     return checksum(np.array([*place, imu.gyro_white_noise, imu.accel_white_noise]))
 
 

@@ -19,7 +19,8 @@ decides."""
 def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> list[str]:
     """Name the stated priors that contradict the data, one line each, the worst first.
 
-    The difference of posterior and prior mean has the variance that the fit takes away from the prior.
+    The difference of posterior and prior mean has the variance that the fit takes away from the prior. What the data
+    say by themselves is further from the prior mean, by the ratio of the prior's variance to that.
 
     Parameters
     ----------
@@ -33,19 +34,18 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
     prior, variance = sensors.prior, np.diag(covariance)
     taken = np.maximum(prior**2 - variance, _LEAST * prior**2)
     told = sensors.restated & (prior > 0.0)
+    said = sensors.mean + (estimate - sensors.mean) * np.divide(prior**2, taken, out=np.ones(len(prior)), where=told)
     pull = np.divide(np.abs(estimate - sensors.mean), np.sqrt(taken), out=np.zeros(len(prior)), where=told)
     out = []
     for k in np.argsort(-pull):
         if pull[k] > _FAR:
-            unit = sensors.parameters[k].display_unit
-            mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, estimate))
+            unit = SITE_REFERENCES.get(sensors.names[k], sensors.parameters[k].display_unit)
+            mean, sigma, found = (from_si(float(v[k]), unit) for v in (sensors.mean, prior, said))
             if sensors.names[k] in SITE_REFERENCES:
                 kind = sensors.names[k].removeprefix("reference_")
-                besides = ", deflection_sigma included" if kind == "latitude" else ""
                 out.append(
-                    f"{kind}_sigma of the site ({sigma:.3g} {unit}{besides}) contradicts the data: they say that "
-                    f"the {kind} told is too large by {found:.4g} {unit}, {pull[k]:.0f} sigma; correct the {kind}, or "
-                    "its sigma"
+                    f"the {kind} of the site, told with a sigma of {sigma:.3g} {unit}, contradicts the data: they say "
+                    f"that it is too large by {found:.4g} {unit}, {pull[k]:.0f} sigma; correct the {kind}, or its sigma"
                 )
                 continue
             out.append(

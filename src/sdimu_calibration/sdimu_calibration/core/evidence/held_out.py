@@ -158,11 +158,6 @@ class _Normal:
 
 
 def gain(before: HeldOut, after: HeldOut, apart: int | None = None) -> tuple[float, float]:
-    """Gain of the log score and its standard error over stops (paired differences), the stop `apart` left out.
-
-    The error is NaN where a single stop is left.
-    """
+    """Gain of the log score and its standard error over stops (paired differences), the stop `apart` left out."""
     difference = (after.log_score - before.log_score)[before.stop != (-1 if apart is None else apart)]
-    if len(difference) < 2:
-        return float(difference.sum()), float("nan")
     return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))

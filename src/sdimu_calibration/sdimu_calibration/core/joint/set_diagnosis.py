@@ -37,8 +37,10 @@ from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
 from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.core.wording import Work
 
 _SHARED = 10.0
 """Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
@@ -86,6 +88,8 @@ def diagnose_set(
     fitted: SetFit | None = None,
 ) -> SetDiagnosis:
     """Find what the model of a set misses; parameters as for `search_set`."""
+    if len(members) < 2:
+        raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     before = set_outcome(found.before)

@@ -106,7 +106,7 @@ def search_set(
     Parameters
     ----------
     members : sequence of Member
-        Of one, what is searched is what a diagnosis of the recording by itself searches.
+        At least two.
     run : callable
         Does the jobs.
     extra : sequence of Effect
@@ -214,8 +214,7 @@ def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run
     effects = _candidates(fit, extra, finer)
     full = _gathered(fit, effects, run)
     local = [_of_one(label) for report in full.reports for label in report.reduction.labels if split_tag(label)[1]]
-    stable = stable_effects(full.model, full.varying) if len(full.reports) > 1 else []
-    reports, labels = with_changes(full.reports, stable)
+    reports, labels = with_changes(full.reports, stable_effects(full.model, full.varying))
     changes = [change_of(label, reports[0].imu) for label in labels]
     shared = [c for effect in effects for c in split(effect)]
     full = replace(full, reports=tuple(reports))
@@ -301,10 +300,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
     heat = all(r.has_temperature for r in fit.reports)
     have = {label for e in fit.model.effects for label in selection.resolve(e).labels}
     have |= set(fit.names)
-    one = len(fit.reports) == 1
-    every = catalogue(report.times, have, heat, of_a_set=not one)
-    # Of one recording, what is of it alone is of all.
-    effects = [*extra, *(e for e in every if one or is_shared(e)), *finer]
+    effects = [*extra, *(e for e in catalogue(report.times, have, heat, of_a_set=True) if is_shared(e)), *finer]
     if any(r.estimator == HandheldFit.estimator for r in fit.reports):
         effects = [e for e in effects if not (e.needs_table or e.random_walk or e.decay_s)]
     found: list[Effect] = []
@@ -318,8 +314,7 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
 def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     """Return the fit with the signatures of effects in its reports."""
     # The search looks at what is left of these rows, not of those before.
-    candidates, several = tuple(map(by_name, tried)), len(fit.reports) > 1
-    return with_reports(fit, asked_again(fit, run, candidates=candidates, with_local=several, rivals=True))
+    return with_reports(fit, asked_again(fit, run, candidates=tuple(map(by_name, tried)), with_local=True, rivals=True))
 
 
 def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:

@@ -75,13 +75,8 @@ class SetFacts:
     again: Recurrence | None
     """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     told: Probabilities | None
-    """None where the search did not know of all that explains the set (a function of the attitude, what was taken
-    back), or did not come to an end."""
-
-    @property
-    def are_several(self) -> bool:
-        """Whether the set has more than one recording."""
-        return len(self.fit.reports) > 1
+    """None where the search did not know the function of the attitude that explains the set, or did not come to an end.
+    """
 
     @property
     def beside_function(self) -> bool:
@@ -113,7 +108,7 @@ def verdict_of_set(facts: SetFacts) -> Verdict:
     left = _scatter(facts.after) < SCATTERS or still or facts.comes_back or facts.is_of_some
     # A fault leaves traces in its recording that are no physics of the unit.
     unexplained = facts.beside_function or (left and (bool(shared) or not findings))
-    # A search that came to no end, or whose finds were taken back, says that something is missing.
+    # A search that came to no end says that something is missing.
     unexplained |= not findings and facts.told is None
     nothing = 1.0 if facts.told is None else facts.told.nothing
     return verdict(Facts(shared, len(findings) - len(shared), unexplained=unexplained, nothing=nothing))
@@ -143,8 +138,7 @@ def _found(word: Verdict, facts: SetFacts) -> str:
     if word == Verdict.CONSISTENT:
         how = "nothing stands out of the noise" if facts.again is None else "each in a noise of its own"
         mark = ":" if facts.again is None else ","
-        what = "all recordings together" if facts.are_several else "the recording"
-        return f"The model explains {what}{mark} {how}{nothing_missing(told)}."
+        return f"The model explains all recordings together{mark} {how}{nothing_missing(told)}."
     if word in {Verdict.DATA_FAULT, Verdict.UNEXPLAINED}:
         names = " and ".join(map(_named, findings[:LISTED]))
         names += f" and {len(findings) - LISTED} more" if len(findings) > LISTED else ""
@@ -156,8 +150,7 @@ def _found(word: Verdict, facts: SetFacts) -> str:
         most = f" Found beside it: {in_grades(list(map(_graded, findings)))}" if findings else ""
         odd = "" if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
-        of_several = "The recordings share something" if shared else "Something differs between the recordings"
-        what = of_several if facts.are_several else "The recording shows something"
+        what = "The recordings share something" if shared else "Something differs between the recordings"
         return f"{what} that no effect of the catalogue explains.{most}{odd}"
     return in_grades(list(map(_graded, findings)))
 
