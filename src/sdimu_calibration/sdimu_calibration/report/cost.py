@@ -42,6 +42,8 @@ class Off:
     """Sigma of the better value, in `unit`: how well the amount is known."""
     sigmas: float
     """The amount over the sigma that it is given with."""
+    value: float = float("nan")
+    """The better value, in `unit`."""
 
     @property
     def text(self) -> str:
@@ -52,6 +54,11 @@ class Off:
     def size(self) -> str:
         """The amount with its sigma and unit: ``+26.2 +- 4.8 ppm``."""
         return f"{self.alone} +- {self.known} {self.unit}"
+
+    @property
+    def better(self) -> str:
+        """The better value with its sigma, without unit: ``-16.1 +- 4.8``."""
+        return f"{self.value:.{decimals(self.sigma)}f} +- {self.known}"
 
     @property
     def alone(self) -> str:
@@ -76,7 +83,8 @@ def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]
         if abs(sigmas) * from_si(size, units[name]) <= known:
             # What it is off by is known no better than that.
             continue
-        out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], known, -sigmas))
+        value = from_si(float(after.values[k]), units[name])
+        out.append(Off(name, from_si(-sigmas * size, units[name]), units[name], known, -sigmas, value))
     return tuple(out)
 
 

@@ -5,6 +5,7 @@ A `FirstScreen` says it in words; the same parts stand on the page of a diagnosi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
@@ -12,9 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
+from sdimu_calibration.core.diagnosis.verdict import statements
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
@@ -23,10 +26,10 @@ from sdimu_calibration.core.plain_text import capital, first_of
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
-from sdimu_calibration.report.cost import InUse, Off, coefficients_off, in_use, metres, wrong_without
+from sdimu_calibration.report.cost import OVER_MODELS, InUse, Off, coefficients_off, in_use, metres, wrong_without
 from sdimu_calibration.report.effect_words import tip
 from sdimu_calibration.report.glossary import explained
-from sdimu_calibration.report.markup import grid, prose, quiet
+from sdimu_calibration.report.markup import grid, prose, quiet, signs
 from sdimu_calibration.report.report_extras import ReportExtras
 
 if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
@@ -39,6 +42,8 @@ _ARROW = " \N{RIGHTWARDS ARROW} "
 _IN_WHITE = "in white noise, in which models compare"
 """What an error means that is not in the noise that was learned."""
 _COSTS, _PREDICTS = "What it costs to ignore it", "How well it predicts"
+_LEAD = 40
+"""Number of characters up to which the words before a colon say how sure a statement is: more are a clause of it."""
 _WORST = 3
 """Number of coefficients that are named as off, and of pieces of advice that are shown at once."""
 
@@ -62,6 +67,8 @@ class FirstScreen:
     """The verdict in a few words; empty for those of the tone."""
     ladder: str = ""
     """Models with their errors, above the costs."""
+    off: str = ""
+    """Coefficients that are wrong without what was found, below the ladder."""
 
 
 def of_diagnosis(
@@ -82,8 +89,9 @@ def of_diagnosis(
     unsaid = [text for text in d.noise if text not in said]
     noise = (prose(f"Noise: {'; '.join(unsaid)}."),) if unsaid else ()
     remarks = (*_remarks(d.after), *noise)
+    off = _off_table(wrong_without(summary, more)[:_WORST])
     ladder = ladder_strip(summary, more)
-    return FirstScreen(tone, _head(summary), _costs(summary, more), told, title, remarks, tag, ladder)
+    return FirstScreen(tone, _head(summary), _costs(summary, more), told, title, remarks, tag, ladder, off)
 
 
 def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
@@ -102,8 +110,9 @@ def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
 
 
 def _head(summary: DiagnosisSummary) -> str:
-    """Verdict as HTML, the equation of each effect that was found under its name."""
-    html = prose(summary.diagnosis.sentence).replace("(-", "(\N{MINUS SIGN}")
+    """Verdict as HTML, a line a grade, the equation of each effect that was found under its name."""
+    html = "".join(f'<span class="grade">{_led(one)}</span>' for one in _statements(summary.diagnosis))
+    html = html.replace("(-", "(\N{MINUS SIGN}")
     # A line never ends between a number and its sigma or its per cent.
     html = html.replace(" \N{PLUS-MINUS SIGN} ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
     for one in summary.candidates:
@@ -111,6 +120,21 @@ def _head(summary: DiagnosisSummary) -> str:
         shown = tip(words, one.candidate.effect, [one.candidate.label])
         html = html.replace(escape(words), shown, 1)
     return html
+
+
+def _led(statement: str) -> str:
+    """Return a statement with the words before its colon, how sure it is, in bold."""
+    lead, colon, rest = statement.partition(": ")
+    return f"<strong>{prose(lead)}:</strong> {prose(rest)}" if colon and len(lead) <= _LEAD else prose(statement)
+
+
+def _statements(d: Diagnosis) -> tuple[str, ...]:
+    """Return the statements of which the sentence of a diagnosis is made."""
+    for held in (True, False):
+        told = statements(d, d.found_effects, held)
+        if " ".join(told) == d.sentence:
+            return told
+    return (d.sentence,)
 
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
@@ -129,12 +153,11 @@ def _unseen(summary: DiagnosisSummary) -> str:
 
 
 def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[str, str], ...]:
-    """Say what is wrong without what was found; of a model that lacks nothing metres and the held-out error."""
+    """Say the error in noise that was learned; of a model that lacks nothing metres and the held-out error."""
     d, out = summary.diagnosis, []
     rungs = error_ladder(d)
     if len(rungs) < 2 and (use := in_use(more)) is not None:
         out.append((use.figures.replace(" -> ", _ARROW), escape(use.words)))
-    out += [_off(one) for one in wrong_without(summary, more)[:_WORST]]
     if noise_learned(d.after):
         out.append(_in_noise(held_out_judged(d.after)))
     if len(rungs) < 2 and np.isfinite(rungs[0][1]):
@@ -144,11 +167,16 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
     return tuple(out)
 
 
-def _off(one: Off) -> tuple[str, str]:
-    """Say by how much a coefficient is wrong."""
-    amount = f"{one.alone} {one.unit}".replace("-", "\N{MINUS SIGN}")
-    known = f"(\N{PLUS-MINUS SIGN}{one.known})"
-    return amount, f"<code>{escape(one.name)}</code> off {known}, {abs(one.sigmas):.1f} sigmas"
+_OFF = ("coefficient", "value", "wrong by", "unit", "in sigmas")
+
+
+def _off_table(worst: Sequence[Off]) -> str:
+    """Return the coefficients that are wrong without what was found: the better value, and by how much; or nothing."""
+    if not worst:
+        return ""
+    rows = [[one.name, signs(one.better), signs(one.alone), one.unit, f"{abs(one.sigmas):.1f}"] for one in worst]
+    told = f"\N{PLUS-MINUS SIGN}: {OVER_MODELS}."
+    return grid(_OFF, rows, {0, 3}) + quiet(told)
 
 
 def _in_noise(error: float) -> tuple[str, str]:
@@ -200,7 +228,7 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     after = held_out(found.after)
     before = after if found.error_without is None else found.error_without
     off = coefficients_off(found.before, found.after) if found.findings else ()
-    costs = [_off(one) for one in off[:_WORST]]
+    costs = []
     values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
     if values:
         costs.append((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"))
@@ -209,7 +237,7 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     told = tuple(advice_html(one, spell) for one in advice)
     tone, tag = set_judged(found)
     title = _COSTS if found.findings else _PREDICTS
-    return FirstScreen(tone, prose(found.sentence), tuple(costs), told, title, tag=tag)
+    return FirstScreen(tone, prose(found.sentence), tuple(costs), told, title, tag=tag, off=_off_table(off[:_WORST]))
 
 
 def set_judged(found: SetDiagnosis) -> tuple[str, str]:
@@ -230,14 +258,14 @@ def render(first: FirstScreen, *pictures: str) -> str:
         f'<li><span class="figure-number">{escape(number)}</span><span>{words}</span></li>'
         for number, words in first.costs
     )
-    what = f'{first.ladder}<ul class="numbers">{costs}</ul>'
+    what = first.ladder + first.off + (f'<ul class="numbers">{costs}</ul>' if costs else "")
     shown = "".join(f"<li>{text}</li>" for text in first.advice[:_WORST])
     rest = "".join(f"<li>{text}</li>" for text in first.advice[_WORST:])
     more = f"<details><summary>{len(first.advice) - _WORST} more</summary><ul>{rest}</ul></details>" if rest else ""
     return (
         f'<section id="verdict"><h2 class="skip">Verdict</h2><div class="verdict {first.tone}" role="status">'
         f'<p class="head"><span class="mark" aria-hidden="true">{_MARKS[first.tone]}</span> '
-        f'<span class="tag">{first.tag or _WORDS[first.tone]}</span> {first.head}</p>'
+        f'<span class="tag">{first.tag or _WORDS[first.tone]}</span></p><p class="said">{first.head}</p>'
         f"{''.join(f'<p>{text}</p>' for text in first.remarks)}</div>"
         f'<div class="columns"><section class="card"><h2>{first.cost_title}</h2>'
         f"{explained(what)}</section>"

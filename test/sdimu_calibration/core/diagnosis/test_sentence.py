@@ -352,7 +352,7 @@ def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, ver
     assert first.tone == tone
     assert first.tag != "The model is wrong" or tone == "bad"
     assert first.advice == (f"Use the coefficients of this page{', which hold what was found' if findings else ''}.",)
-    assert any("</code> off (" in words for _, words in first.costs) == bool(findings)
+    assert ("wrong by" in first.off) == bool(findings)
 
 
 def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
@@ -360,7 +360,7 @@ def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
     terms = (NoiseTerm("gyro", FLICKER, size=1e-5), unknown)
     d = summary.diagnosis
     told = sentence(replace(d, verdict=Verdict.UNEXPLAINED, rungs=(), found=replace(d.found, noise=terms)), ())
-    left, _, account = told.partition("; the sigmas take ")
+    left, _, account = told.partition("; the sigmas count ")
     assert term_in_words(unknown) in left
     assert "flicker" not in left
     assert account.startswith("it and gyro bias instability (flicker)")

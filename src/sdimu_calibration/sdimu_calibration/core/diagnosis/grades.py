@@ -68,7 +68,12 @@ def graded(found: Iterable[Found], told: Probabilities | None) -> tuple[Graded, 
 
 
 def in_grades(found: Sequence[Graded], certain: str = "Certain") -> str:
-    """Say what was found by how sure it is; without grades where no probabilities were worked out.
+    """Say what was found by how sure it is, as `each_grade` does, in one text."""
+    return " ".join(each_grade(found, certain))
+
+
+def each_grade(found: Sequence[Graded], certain: str = "Certain") -> tuple[str, ...]:
+    """Say what was found by how sure it is, a sentence a grade; without grades where no probabilities were worked out.
 
     Parameters
     ----------
@@ -76,13 +81,13 @@ def in_grades(found: Sequence[Graded], certain: str = "Certain") -> str:
         Word before what is certain.
     """
     if any(np.isnan(one.probability) for one in found):
-        return f"Missing in the model: {listed(one.words for one in found)}."
+        return (f"Missing in the model: {listed(one.words for one in found)}.",)
     firm = [one.words for one in found if one.certain and not one.is_open]
     told = [f"{certain}: {listed(firm)}."] if firm else []
     told += [f"{certain}, but open which: {_open(one)}." for one in found if one.certain and one.is_open]
     told += [f"Likely ({in_percent(one.probability)}): {_likely(one)}." for one in found if not one.certain]
     more = len(told) - LISTED
-    return " ".join(told[:LISTED]) + (f" {more} more are in the table." if more > 0 else "")
+    return (*told[:LISTED], *([f"{more} more are in the table."] if more > 0 else []))
 
 
 def _family(one: Found, shares: Sequence[Share], told: Probabilities | None) -> str:

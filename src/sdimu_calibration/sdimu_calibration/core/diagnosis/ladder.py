@@ -91,7 +91,7 @@ def error_ladder(d: Diagnosis) -> list[tuple[str, float]]:
         return [(r.name, r.held_out_rms) for r in d.rungs]
     first = ("model as given", held_out(d.before))
     added = [c.label for c in d.chosen]
-    name = f"+ {added[0]}" if len(added) == 1 else f"+ {len(added)} effects"
+    name = f"+ {added[0]}" if len(added) == 1 else "with what was found"
     return [first, (name, held_out(d.after))] if added else [first]
 
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.grades import LISTED, Graded, graded, in_grades, listed, other_coefficients
+from sdimu_calibration.core.diagnosis.grades import (
+    LISTED,
+    Graded,
+    each_grade,
+    graded,
+    in_grades,
+    listed,
+    other_coefficients,
+)
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, noise_learned
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import OF_RECORDING
@@ -36,6 +44,8 @@ _ROUNDING = 1e-6
 _EQUATION = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 
+_IF_NONE = "as noise, and may be too small if it is none"
+"""What is said of sigmas that hold something unexplained."""
 _FITTED = "In what was fitted, but not beyond it"
 """What is said in the place of ``Certain`` where what was found fails on data that no fit has seen."""
 
@@ -82,7 +92,12 @@ def verdict(facts: Facts) -> Verdict:
 
 
 def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
-    """Put the verdict into one sentence: what was found by how sure it is.
+    """Put the verdict into one text: the statements of `statements`."""
+    return " ".join(statements(d, found, held))
+
+
+def statements(d: Diagnosis, found: Sequence[Found], held: bool = True) -> tuple[str, ...]:
+    """Say the verdict: what was found by how sure it is, a statement a grade, then what is left.
 
     Parameters
     ----------
@@ -92,22 +107,22 @@ def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
         Whether it holds where it was not fitted; False: nothing of it is called certain.
     """
     if d.verdict == Verdict.CONSISTENT:
-        return _consistent(d)
+        return (_consistent(d),)
     if d.verdict == Verdict.NOISE_MODEL_WRONG:
         nothing = nothing_missing(d.probabilities)
-        return f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}."
+        return (f"The noise model is wrong, and no missing effect shows{nothing}: {'; '.join(d.noise)}.",)
     if d.verdict == Verdict.DATA_FAULT:
         grave = [f.text for f in d.findings if f.grave]
-        return f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found)
+        return (f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found),)
     every = _graded(d, [one for one in found if not _is_fault(one)])
     firm = (_EQUATION if d.own else "Certain") if held else _FITTED
-    told = f"{in_grades(every, firm)} {_of_recording(d, found)}".strip()
+    told = tuple(text for text in (*each_grade(every, firm), _of_recording(d, found)) if text)
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, told)
     if not d.chosen and d.probabilities is not None:
-        return something_missing(d.probabilities)
+        return (something_missing(d.probabilities),)
     # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    return f"No effect of the catalogue fits, an equation does. {told}" if d.own else told
+    return ("No effect of the catalogue fits, an equation does.", *told) if d.own else told
 
 
 def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:
@@ -156,35 +171,36 @@ def _consistent(d: Diagnosis) -> str:
     return f"{clean}; but {odd}." if odd else f"{clean}."
 
 
-def _unexplained(d: Diagnosis, told: str) -> str:
+def _unexplained(d: Diagnosis, told: tuple[str, ...]) -> tuple[str, ...]:
     if d.rungs and d.rungs[-1].scatter is not None:
         most = f", {d.found.steps[0].label} most" if d.found.steps else ""
         left = beyond(d.rungs[-1].scatter)
-        return f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}."
+        return (f"Something stands out of the scatter{most}. Scatter beyond white noise: {left}.",)
     names = listed(c.label for c in d.chosen)
     follows = [term_in_words(term) for term in d.found.noise if term.kind in FOLLOWS]
     drawn = [term_in_words(term) for term in d.found.noise if term.kind not in FOLLOWS]
     if follows:
-        begun = f"{told} What is left is the" if names else "No effect of the catalogue explains the"
+        begun = "What is left is the" if names else "No effect of the catalogue explains the"
         # Noise that every sensor has is no part of what is unexplained.
         account = " and ".join(("it", *drawn))
-        return f"{begun} {' and '.join(follows)}; the sigmas take {account} into account."
+        return (*(told if names else ()), f"{begun} {' and '.join(follows)}; the sigmas count {account} {_IF_NONE}.")
     like_effects = any(term.kind in DRAWN for term in d.found.noise)
     may_be = "" if names or like_effects else _may_be(d.probabilities)
     if may_be:
-        return f"Something is missing, and which is open: {may_be}."
+        return (f"Something is missing, and which is open: {may_be}.",)
     if drawn:
-        begun = f"{told} What is left" if names else "Something is missing that"
-        return (
+        begun = "What is left" if names else "Something is missing that"
+        looks = (
             f"{begun} looks like {' and '.join(drawn)}: a cause outside the catalogue, or a bias that does so; the "
-            "sigmas take it into account."
+            f"sigmas count it {_IF_NONE}."
         )
+        return (*(told if names else ()), looks)
     tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""
     error = held_out_judged(d.after)
     if names and error > 1.0:
         noise = " in the noise that was learned" if noise_learned(d.after) else ""
         tail += f", and the error at stops held out is then {error:.2f}{noise} (1 is right)"
-    return f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}."
+    return (f"Something is missing that no effect of the catalogue explains{tail}{_coloured(d.consistency)}.",)
 
 
 def _may_be(told: Probabilities | None) -> str:

@@ -33,8 +33,8 @@ class NoiseEstimate:
         """What a user should know, with the terms and their sizes."""
         terms = "; ".join(term_in_words(term) for term in self.terms)
         told = (
-            f"the noise is not white: {terms}; values and sigmas take it into account. A missing effect can look the "
-            "same"
+            f"the noise is not white: {terms}; values and sigmas are those in this noise. A missing effect can look "
+            "the same, and the sigmas are then too small"
         )
         return Note(told, end=f": run {Work.DIAGNOSE}")
 

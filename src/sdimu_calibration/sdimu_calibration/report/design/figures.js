@@ -2,7 +2,7 @@
 (function () {
   var LARGE = 1.5, NEAR = '400px', CELL = 27, WIDE = 33, BAR = 80, NOTABLE = 3, queue = [], library = null;
   // Width of a digit below a map and what keeps labels apart; least height of the map of a first screen (px).
-  var DIGIT = 8, APART = 8, LEAST = 250;
+  var DIGIT = 8, APART = 8, LEAST = 225;
 
   // The library lies in the page compressed: it is unpacked once, after the page is there.
   function load() {

@@ -13,6 +13,7 @@ from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
+from sdimu_calibration.report.cost import OVER_MODELS
 from sdimu_calibration.report.markup import signs
 from sdimu_calibration.report.odds_section import family_in_words
 from sdimu_calibration.report.table import with_sigma
@@ -44,7 +45,7 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.mended or (missing.adequate and objections):
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    cost = "" if missing.worst is None else f" Wrong without it: {missing.worst.text}."
+    cost = "" if missing.worst is None else f" Wrong without it: {missing.worst.text}; +-: {OVER_MODELS}."
     return f"{mark} {signs(missing.sentence + cost)}", f"verdict {tone}"
 
 

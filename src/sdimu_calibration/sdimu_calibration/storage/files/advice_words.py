@@ -110,8 +110,16 @@ def _latitude(said: Speech, off: float, sigma: float) -> str:
 
 
 def _apart(pairs: Sequence[tuple[str, Sequence[str]]], what: Advice) -> str:
-    told = ", and ".join(f"{label} from {', '.join(others)}" for label, others in pairs)
+    told = ", and ".join(f"{label} from {', '.join(_names(others))}" for label, others in pairs)
     return f"To tell {told}: {sentence(what)}."
+
+
+def _names(labels: Sequence[str]) -> list[str]:
+    """Return each coefficient once, without its time constants: what tells it from others tells each of them."""
+    heads = (label.partition("(")[0] for label in labels)
+    # The brackets of an equation, or those of another recording's name, are no time constant.
+    names = (head if head.isidentifier() else label for head, label in zip(heads, labels, strict=True))
+    return list(dict.fromkeys(names))
 
 
 def _matters(label: str, stakes: Sequence[tuple[str, str, float]]) -> str:
@@ -133,7 +141,7 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.LEAVE_OUT_TIMES: lambda text: f"Mend the recording first: {text}. Without that time",
     Kind.LOOK_FIRST: lambda text: f"Look at this first: {text}.",
     Kind.REPEAT_STOPS: lambda: (
-        "The noise has a memory, which no compensation removes; values and sigmas take it into account. More "
+        "The noise has a memory, which no compensation removes; values and sigmas are those in it. More "
         "stops, or the same attitudes again later, lower its share."
     ),
     Kind.OTHER_GRADE: lambda text: f"Look at the IMU's file first: {text}.",
