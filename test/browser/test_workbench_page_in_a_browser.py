@@ -6,13 +6,13 @@ import json
 import re
 import subprocess
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 from plans import HIDDEN
 
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.report.cost import metres
 from sdimu_calibration.report.table import with_sigma
 
 from .bench_page import add_first, choose, click_cell, drawn, held_out, text
@@ -127,12 +127,34 @@ def test_on_a_screen_of_4k_every_word_is_read_and_in_its_place(visit: Callable[[
     assert unfit(page) == []
 
 
-def test_a_click_on_a_candidate_shows_the_numbers_of_the_shell(
-    visit: Callable[[], Any], workbench: Workbench, tmp_path: Path
-) -> None:
-    command = sdimu("diagnose", workbench.bag, "--out", tmp_path)
+@pytest.fixture(scope="module")
+def told(workbench: Workbench, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the shell says of the recording."""
+    out = tmp_path_factory.mktemp("told")
+    command = sdimu("diagnose", workbench.bag, "--out", out)
     subprocess.run(command, check=True, capture_output=True, timeout=START_S)
-    told = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
+    return dict(json.loads((out / "diagnosis.json").read_text(encoding="utf-8")))
+
+
+def test_each_model_of_the_ladder_has_the_metres_of_the_shell(visit: Callable[[], Any], told: dict[str, Any]) -> None:
+    shell = {one["model"]: metres(one["rms_m"]) for one in told["in_use"]["position"]}
+    page = visit()
+    page.locator("#in-use", has_text="without aid").wait_for()
+    said = text(page, "in-use")
+    assert said.startswith(" \N{RIGHTWARDS ARROW} ".join(f"{far} ({model})" for model, far in shell.items()))
+    assert [words.partition(", ")[2] for words in drawn(page, "ladder", "text")] == [shell["model as given"]]
+    add_first(page)
+    page.locator("#verdict", has_text="\N{CHECK MARK}").wait_for()
+    page.wait_for_function(
+        "() => { const t = document.querySelector('#ladder .js-plotly-plot')._fullData[0].text;"
+        " return t.length === 2 && Array.from(t).every(words => words.endsWith(' m')); }"
+    )
+    settle(page)
+    worth = [words.partition(", ")[2] for words in drawn(page, "ladder", "text")]
+    assert worth == [shell["model as given"], shell["with what was found"]]
+
+
+def test_a_click_on_a_candidate_shows_the_numbers_of_the_shell(visit: Callable[[], Any], told: dict[str, Any]) -> None:
     (step,) = told["ladder"]
     (found,) = told["candidates"]
     page = visit()

@@ -124,16 +124,17 @@ class InUse:
     @property
     def words(self) -> str:
         """What the distances are, and of which compensations."""
-        return f"{self._kind}: {', '.join(self.names)}{self.expected}"
+        return f"{self.kind}: {', '.join(self.names)}{self.expected}"
 
     @property
     def sentence(self) -> str:
         """Each distance with its compensation, then what they are: ``2.0 km (not compensated) -> 52 m (...): ...``."""
         told = (f"{metres(value)} ({name})" for value, name in zip(self.distance, self.names, strict=True))
-        return f"{' -> '.join(told)}: {self._kind}{self.expected}"
+        return f"{' -> '.join(told)}: {self.kind}{self.expected}"
 
     @property
-    def _kind(self) -> str:
+    def kind(self) -> str:
+        """What the distances are."""
         return f"position after {self.minutes:.0f} min without aid, over {self.where} that no fit has seen"
 
     @property

@@ -30,7 +30,7 @@ from sdimu_calibration.report.cost import OVER_MODELS, InUse, Off, coefficients_
 from sdimu_calibration.report.effect_words import tip
 from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.markup import grid, prose, quiet, signs
-from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.report_extras import FOUND, ReportExtras
 
 if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
@@ -305,5 +305,5 @@ def _line(name: str, place: int, models: int, error: float, use: InUse | None) -
     if use is None:
         return [name, held_out]
     distance = dict(zip(use.names, use.distance, strict=True))
-    key = "with what was found" if place == models - 1 else name
+    key = FOUND if place == models - 1 else name
     return [name, metres(distance[key]) if key in distance else "", held_out]

@@ -11,6 +11,9 @@ from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.recording import DataError, TableLog
 from sdimu_calibration.core.results import Calibration
 
+FOUND = "with what was found"
+"""Name of the model that has everything that a diagnosis found, where a navigation without aid has been tried."""
+
 
 @dataclass(frozen=True)
 class ReportExtras:
@@ -33,7 +36,7 @@ def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportE
     its place.
     """
     between = [(rung.name, rung.fit) for rung in diagnosis.rungs[1:-1] if rung.fit is not None]
-    rivals = [*between, ("with what was found", diagnosis.extended)] if len(diagnosis.found.chosen) else []
+    rivals = [*between, (FOUND, diagnosis.extended)] if len(diagnosis.found.chosen) else []
     table = diagnosis.fit.test.recording.table
     given = None if delivered is None else outcome(delivered, refuse=False)
     try:

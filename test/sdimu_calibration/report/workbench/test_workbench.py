@@ -18,7 +18,7 @@ from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.cost import wrong_without
+from sdimu_calibration.report.cost import OVER_MODELS, wrong_without
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.workbench.app import build
 from sdimu_calibration.report.workbench.fit import FitSession
@@ -163,7 +163,7 @@ def test_the_verdict_leads_with_what_is_wrong_by_the_figure_of_the_report(app, b
     assert bench.missing(Setting()).worst.text == worst.text
     # Values keep beside their sigmas by spaces that no line breaks at.
     told = Page(app).verdict.replace("\N{NO-BREAK SPACE}", " ")
-    assert f"Wrong without it: {worst.text}.".replace("+-", "\N{PLUS-MINUS SIGN}") in told
+    assert f"Wrong without it: {worst.text}; +-: {OVER_MODELS}.".replace("+-", "\N{PLUS-MINUS SIGN}") in told
 
 
 def test_an_effect_of_ones_own_does_what_the_registered_one_does(app, bench):

@@ -11,6 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
+from sdimu_calibration.report.cost import InUse, metres
 from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, INK, PALE, Figure, lay_out, literal
 from sdimu_calibration.report.workbench.axes import TIME
 from sdimu_calibration.report.workbench.fit import Fitted
@@ -178,8 +179,14 @@ def _left(fitted: Fitted) -> set[int]:
     return set(fitted.residuals.stop[np.isfinite(fitted.left_out).any(axis=1)].tolist())
 
 
-def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None]) -> Figure:
-    """Error of each fit with one stop left out, less one, on a scale of powers: a small step is seen, too."""
+def ladder(
+    names: Sequence[str], values: Sequence[float], at_held: Sequence[float | None], use: InUse | None = None
+) -> Figure:
+    """Error of each fit with one stop left out, and what it is worth in metres.
+
+    `use`: navigations without aid with these models, behind those with none; None until they are worked out.
+    """
+    worth = [""] * len(names) if use is None else [f", {metres(value)}" for value in use.distance[1 : 1 + len(names)]]
     figure = Figure()
     short = [literal(name if len(name) < 26 else f"{name[:24]}\N{HORIZONTAL ELLIPSIS}") for name in names]
     figure.add(
@@ -187,7 +194,7 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
         y=short,
         x=list(values),
         mode="lines+markers+text",
-        text=[f"{v:.3f}" for v in values],
+        text=[f"{v:.3f}{far}" for v, far in zip(values, worth, strict=True)],
         name="leave one out",
         textposition="middle right",
         line={"color": AFTER},
@@ -210,7 +217,9 @@ def ladder(names: Sequence[str], values: Sequence[float], at_held: Sequence[floa
     numbers = [v for v in (*values, *at_held, 1.0) if v is not None]
     low, high = min(numbers), max(numbers)
     room = max(0.3 * (high - low), 0.02)
-    figure.x_axes(title="one stop left out (sigma)", range=[low - 0.3 * room, high + 1.4 * room])
+    # A number with metres is twice as wide as one alone.
+    beside = 1.4 if use is None else 2.8
+    figure.x_axes(title="one stop left out (sigma)", range=[low - 0.3 * room, high + beside * room])
     figure.y_axes(type="category", autorange="reversed", ticks="", automargin=True, title="model", standoff=0)
     return lay_out(figure, HEIGHT, margin=_SHORT | {"l": 20, "r": 40})
 

@@ -38,12 +38,12 @@ from sdimu_calibration.core.results import Calibration, no_history
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
-from sdimu_calibration.report.cost import Off, wrong_without
-from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.cost import InUse, Off, in_use, wrong_without
+from sdimu_calibration.report.report_extras import FOUND, ReportExtras
 from sdimu_calibration.report.sections import classes_of
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
-from sdimu_calibration.report.workbench.own_effect import added_effects, stated_priors
+from sdimu_calibration.report.workbench.own_effect import added_effects, named, stated_priors
 from sdimu_calibration.report.workbench.setting import Setting
 
 Tell = Callable[[str, float], None]
@@ -103,6 +103,8 @@ class Missing:
     """
     classes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """What each coefficient that was found may be, itself first, each with its probability in words."""
+    in_use: InUse | None = None
+    """Metres without aid: with nothing, each model of the ladder, and what was found; None where there are none."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,11 @@ class FitSession:
         """Return a fit that was made already."""
         return self._fits.get(setting)
 
+    def known_in_use(self, setting: Setting) -> InUse | None:
+        """Return the metres of a ladder where they were worked out already."""
+        known = self._missing.get(setting)
+        return None if known is None else known.in_use
+
     def fit(self, setting: Setting, tell: Tell = silent) -> Fitted:
         """Fit what a setting says; `tell` gets a word and the share done."""
         with self._lock:
@@ -163,6 +170,7 @@ class FitSession:
                     _mended(summary),
                     off[0] if off else None,
                     classes_of(summary.found),
+                    self._in_metres(setting, scores.fit, told, tell),
                 )
                 _keep(self._missing, setting, found)
             return self._missing[setting]
@@ -229,6 +237,25 @@ class FitSession:
         self._warm = (setting, fit)
         return fit
 
+    def _in_metres(self, setting: Setting, fit: Fit, told: Diagnosis, tell: Tell) -> InUse | None:
+        """Navigate without aid with each model of a ladder and with what was found, as a report does.
+
+        `fit`: of the setting; `told`: its diagnosis. None where the recording is too short, or by hand.
+        """
+        below = [self._once_more(setting.rung(count), tell) for count in range(len(setting.added))]
+        first, *others = *below, fit
+        rivals = [(f"+ {named(text)}", one) for text, one in zip(setting.added, others, strict=True)]
+        rivals += [(FOUND, told.extended)] if len(told.found.chosen) else []
+        try:
+            return in_use(ReportExtras(trials=first.free_inertial(rivals)))
+        except DataError:
+            return None
+
+    def _once_more(self, setting: Setting, tell: Tell) -> Fit:
+        """Fit a setting with its matrices again; those that are kept stay in their place."""
+        start = self.fit(setting, tell).start
+        return solve(self._left(setting), self._extended(setting), start=start, progress=tell)
+
     def _survey(self, setting: Setting, tell: Tell) -> Diagnosis:
         if self._surveyed is None or self._surveyed[0] != setting:
             fit = self._solved(setting, tell)
@@ -274,7 +301,7 @@ def _left_out(fit: Fit, whole: PreparedTest) -> Floats:
 
 
 def _keep(kept: dict[Setting, Any], setting: Setting, value: Any) -> None:
-    """Keep a fit; the oldest goes when there are too many."""
+    """Keep what was worked out of a fit; the oldest goes when there are too many."""
     while len(kept) >= _MOST_KEPT:
         kept.pop(next(iter(kept)))
     kept[setting] = value

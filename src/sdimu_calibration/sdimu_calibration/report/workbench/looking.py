@@ -15,6 +15,7 @@ from sdimu_calibration.report.workbench import figures, parts
 from sdimu_calibration.report.workbench.fit import Missing
 from sdimu_calibration.report.workbench.own_effect import named
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
+from sdimu_calibration.report.workbench.showing import ladder
 from sdimu_calibration.report.workbench.state import from_json
 from sdimu_calibration.report.workbench.task_progress import LOOKING, TaskProgress
 
@@ -37,6 +38,8 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
         Output("ranking", "figure"),
         Output("candidate", "options"),
         Output("candidate", "value"),
+        Output("ladder", "figure", allow_duplicate=True),
+        Output("in-use", "children"),
         Input("shown", "data"),
         Kept("look", "data"),
         Kept("candidate", "value"),
@@ -61,6 +64,8 @@ def _score(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
             picture,
             parts.options(missing.entries),
             still,
+            ladder(bench, now.now, look, tell),
+            parts.in_use(missing.in_use),
         )
 
 

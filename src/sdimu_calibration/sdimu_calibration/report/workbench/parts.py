@@ -13,7 +13,7 @@ from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data
-from sdimu_calibration.report.cost import OVER_MODELS
+from sdimu_calibration.report.cost import OVER_MODELS, InUse
 from sdimu_calibration.report.markup import signs
 from sdimu_calibration.report.odds_section import family_in_words
 from sdimu_calibration.report.table import with_sigma
@@ -45,7 +45,9 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
     mark, tone = ("\N{CHECK MARK}", "good") if missing.adequate else ("\N{HEAVY BALLOT X}", "bad")
     if missing.mended or (missing.adequate and objections):
         mark, tone = "\N{WARNING SIGN}", "doubtful"
-    cost = "" if missing.worst is None else f" Wrong without it: {missing.worst.text}; +-: {OVER_MODELS}."
+    cost = (
+        "" if missing.worst is None else f" Wrong without it: {missing.worst.text}; \N{PLUS-MINUS SIGN}: {OVER_MODELS}."
+    )
     return f"{mark} {signs(missing.sentence + cost)}", f"verdict {tone}"
 
 
@@ -79,6 +81,11 @@ def numbers(fitted: Fitted, given: Fitted) -> str:
     held = "" if fitted.at_held is None else f"; of what is left out {fitted.at_held:.3f}"
     errors = f"Error with one stop left out {fell}{fitted.held_out:.3f} sigma{held}."
     return " ".join([errors, *(f"{line}." for line in fitted.calibration.inseparable)])
+
+
+def in_use(use: InUse | None) -> str:
+    """Say the metres without aid of each model, in the words of a report; nothing where there are none."""
+    return "" if use is None else f"{capital(use.sentence)}.".replace("->", "\N{RIGHTWARDS ARROW}")
 
 
 def left_out(setting: Setting) -> str:

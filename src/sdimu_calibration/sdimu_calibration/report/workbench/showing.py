@@ -16,6 +16,7 @@ from sdimu_calibration.report.workbench import figures, parts, tables
 from sdimu_calibration.report.workbench.fit import FitSession, Fitted, Preview, Tell
 from sdimu_calibration.report.workbench.own_effect import named
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
+from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.report.workbench.state import State, from_json
 from sdimu_calibration.report.workbench.task_progress import BUSY, TaskProgress
 from sdimu_calibration.report.workbench.view import GIVEN, WITH
@@ -107,12 +108,10 @@ def _shown(bench: FitSession, now: State, recording: str, names: list[str], look
     fits = [bench.fit(rung, tell) for rung in rungs]
     here, given = fits[-1], fits[0]
     channel, stop = cell_of(now, here)
-    words = ["model as given", *(f"+ {named(text)}" for text in setting.added)]
-    ladder = figures.ladder(words, [r.held_out for r in fits], [r.at_held for r in fits])
     return (
         f"Workbench: {recording}",
         parts.numbers(here, given),
-        figures.finished(ladder, look),
+        ladder(bench, setting, look, tell),
         [{"label": named(text), "value": text} for text in setting.added],
         [{"label": f"stop {s}", "value": s} for s in bench.stops],
         list(setting.held),
@@ -126,6 +125,14 @@ def _shown(bench: FitSession, now: State, recording: str, names: list[str], look
         channel,
         stop,
     )
+
+
+def ladder(bench: FitSession, setting: Setting, look: Any, tell: Tell) -> Any:
+    """Draw the ladder of a setting, with its metres where they were worked out."""
+    fits = [bench.fit(setting.rung(count), tell) for count in range(len(setting.added) + 1)]
+    words = ["model as given", *(f"+ {named(text)}" for text in setting.added)]
+    use = bench.known_in_use(setting)
+    return figures.finished(figures.ladder(words, [r.held_out for r in fits], [r.at_held for r in fits], use), look)
 
 
 def cell_of(now: State, fitted: Fitted) -> tuple[int, int]:

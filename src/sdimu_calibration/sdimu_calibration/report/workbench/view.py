@@ -191,7 +191,11 @@ def _middle() -> Any:
                 dcc.Dropdown(id="candidate", placeholder="or search the catalogue"),
                 html.Div(graph("ranking", "Score of every candidate"), id="candidates"),
             ),
-            card("How far the error fell", graph("ladder", "Held-out error of each model")),
+            card(
+                "How far the error fell",
+                graph("ladder", "Held-out error of each model, and its metres"),
+                html.P(id="in-use", className="quiet"),
+            ),
         ],
         className="column",
     )
