@@ -78,9 +78,9 @@ thorough-rest: export SDIMU_FIRST_DOMAIN = 215
 thorough-nodes: export SDIMU_FIRST_DOMAIN = 219
 other-blas: export SDIMU_FIRST_DOMAIN = 223
 colcon: export SDIMU_FIRST_DOMAIN = 227
-# Two folders hold all of them: to import the others would take each worker 5 s.
+# Three folders hold all of them: to import the others would take each worker 5 s.
 thorough-nodes: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book test/browser
 
 thorough-rest: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
