@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.cli.fleet import fleet
 
-from .conftest import WIDE_4K, crossing_labels, unfit
+from .conftest import WIDE_4K, broken_rules, crossing_labels, unfit
 
 SHEET_PX = 703
 """Width of A4 less the margins of the pages (186 mm) at 96 dots an inch."""
@@ -96,3 +96,17 @@ def test_on_a_screen_of_4k_every_word_of_a_data_sheet_is_read_and_in_its_place(b
     opened.goto(f"file://{folder / 'datasheet.html'}")
     assert unfit(opened) == []
     assert opened.faults == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("kind", ["fleet", "data sheet", "certificate"])
+def test_no_rule_of_access_is_broken(batch, opened, kind, theme):
+    folder = batch(units=6, out=2) if kind == "fleet" else batch(units=1, each=3)
+    if kind == "fleet":
+        fleet([folder])
+    else:
+        datasheet([folder], certificate=kind == "certificate", operator="A. Person" if kind == "certificate" else "")
+    opened.emulate_media(color_scheme=theme)
+    opened.goto(f"file://{folder / ('fleet.html' if kind == 'fleet' else 'datasheet.html')}")
+    opened.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    assert broken_rules(opened) == []
