@@ -69,11 +69,11 @@ def test_no_rule_of_accessibility_is_broken(opened: Any) -> None:
 def test_the_first_screen_answers(opened: Any, diagnosis: Diagnosis) -> None:
     """Verdict, costs, advice, ladder and heat map are seen without scrolling."""
     below = "e => e.getBoundingClientRect().bottom"
-    parts = (".verdict .head", ".numbers li:last-child span", "ol li:last-child", ".pictures .card:last-child .quiet")
+    parts = (".verdict .said", ".columns .card .quiet", "ol li:last-child", ".pictures .card:last-child .quiet")
     for part in parts:
         assert opened.locator(f"#verdict {part}").last.evaluate(below) <= 900, part
     (found,) = diagnosis.chosen
-    assert found.effect.title in opened.locator(".verdict .head").inner_text()
+    assert found.effect.title in opened.locator(".verdict .said").inner_text()
 
 
 def test_the_map_gives_way_to_words_and_keeps_its_numbers(browser: Any, report: Path) -> None:

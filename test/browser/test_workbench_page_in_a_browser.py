@@ -188,6 +188,19 @@ def test_a_candidate_is_drawn_over_the_residuals_before_it_is_added(visit: Calla
     assert held_out(page) == pytest.approx(after, abs=0.01)
 
 
+def test_the_card_that_was_clicked_says_what_is_done_for_it(visit: Callable[[], Any]) -> None:
+    page = visit()
+    told = (
+        "() => Array.from(document.querySelectorAll('.card[data-working]'),"
+        " card => card.contains(document.getElementById('add')))"
+    )
+    assert page.evaluate(told) == []
+    add_first(page)
+    page.wait_for_function(f"JSON.stringify(({told})()) === '[true]'")
+    settle(page)
+    page.wait_for_function(f"({told})().length === 0")
+
+
 def test_before_and_after_are_shown_by_a_key_on_the_same_cells(visit: Callable[[], Any]) -> None:
     page = visit()
     given = drawn(page, "heat", "z.map(r => Array.from(r))")

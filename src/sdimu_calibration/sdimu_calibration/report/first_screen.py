@@ -168,6 +168,7 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
 
 
 _OFF = ("coefficient", "value", "wrong by", "unit", "in sigmas")
+"""Headings of the coefficients that are wrong: the last two are of what is wrong."""
 
 
 def _off_table(worst: Sequence[Off]) -> str:

@@ -1,6 +1,6 @@
 // Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
 (function () {
-  var LARGE = 1.5, NEAR = '400px', CELL = 27, WIDE = 33, BAR = 80, NOTABLE = 3, queue = [], library = null;
+  var LARGE = 1.5, NEAR = '400px', CELL = 27, WIDE = 33.5, BAR = 80, NOTABLE = 3, queue = [], library = null;
   // Width of a digit below a map and what keeps labels apart; least height of the map of a first screen (px).
   var DIGIT = 8, APART = 8, LEAST = 225;
 
