@@ -240,7 +240,6 @@ LONG = {
     "test/sdimu_calibration/core/joint/test_set_search.py": (
         "test_a_clean_set_is_consistent",
         "test_a_fault_of_one_recording_is_told_of_that_one",
-        "test_taking_back_effects_keeps_the_fault_of_one_recording",
         "test_what_all_have_and_one_has_more_of_is_told_as_both",
         "test_over_the_told_model_alone_coefficients_are_those_of_its_fit",
         "test_the_told_model_has_the_sigmas_of_its_fit",

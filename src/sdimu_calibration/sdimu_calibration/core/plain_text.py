@@ -44,6 +44,11 @@ def first_of(names: Sequence[str], most: int) -> str:
     return ", ".join(names[:most]) + (" and others" if len(names) > most else "")
 
 
+def listing(names: Sequence[str], between: str = "and") -> str:
+    """Write names one after the other, with a word between the last two."""
+    return f" {between} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def capital(text: str) -> str:
     """Begin a text with a capital letter, and leave the rest as it is: units keep their spelling."""
     return text[:1].upper() + text[1:]

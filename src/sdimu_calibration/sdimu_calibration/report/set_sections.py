@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.evidence_figures import deviates
@@ -125,21 +125,17 @@ def _trends(calibration: Calibration, of_set: SetSummary) -> list[str]:
 def recurrence_section(found: Recurrence) -> str:
     """Tell what comes back of that what the model leaves in the stops."""
     rows = [
-        [f"same {one.kind}", str(one.pairs), _number(one.correlation, 2), _number(one.score, 1), ", ".join(one.sensors)]
+        [f"same {one.kind}", str(one.pairs), in_percent(one.probability) if np.isfinite(one.probability) else ""]
         for one in found.kinds
     ]
     sensors = ", ".join(found.sensors)
-    chance = (
-        f"Chance reaches {found.limit:.1f} sigma in one set of a hundred. Empty: the recordings say nothing of it."
-        if math.isfinite(found.limit)
+    more = (
+        f"That it comes back at all: {in_percent(found.probability)}. Empty: the recordings say nothing of it."
+        if found.told
         else "The recordings share too few stops to say more."
     )
     return section(
         "What comes back",
-        grid(("at the", "pairs of stops", "correlation", "sigma", "sensors"), rows, {0, 4}),
-        quiet(f"What the model leaves in the stops ({sensors}), compared between recordings. {chance}"),
+        grid(("at the", "pairs of stops", "probability"), rows, {0}),
+        quiet(f"What the model leaves in the stops ({sensors}), compared between recordings. {more}"),
     )
-
-
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if np.isfinite(value) else ""

@@ -52,7 +52,7 @@ def z_of_result(told: Calibration, unit) -> np.ndarray:
 
 
 def test_coefficients_are_as_good_as_their_sigmas_say(unit, as_given):
-    z = z_of(with_function(as_given, ("accel_x",), here).fit, unit)
+    z = z_of(with_function(as_given, ("accel_x",), here), unit)
     assert np.sqrt(np.mean(z**2)) < 1.3
     assert np.abs(z).max() < 4.0
     # Without the function coefficients are off by many sigmas: what is tested is there.
@@ -61,12 +61,14 @@ def test_coefficients_are_as_good_as_their_sigmas_say(unit, as_given):
 
 def test_it_changes_next_to_nothing_where_nothing_is_left(options):
     clean = fit_set(unit_set(SEED, [FORTH, backwards(FORTH)]).members, options, here)
-    beside = with_function(clean, ("accel_x",), here).fit
+    beside = with_function(clean, ("accel_x",), here)
     sigma = np.sqrt(np.diag(clean.estimate.covariance))
-    np.testing.assert_array_less(np.abs(beside.estimate.values - clean.estimate.values), sigma)
+    p = len(clean.names)
+    assert beside.names[:p] == clean.names
+    np.testing.assert_array_less(np.abs(beside.estimate.values[:p] - clean.estimate.values), sigma)
     # It may be as large as the noise hides: in the coefficients of that accelerometer alone.
     others = ~np.array([name.startswith("accel") and "x" in name.rpartition("_")[2] for name in clean.names])
-    grown = np.sqrt(np.diag(beside.estimate.covariance)) / sigma
+    grown = np.sqrt(np.diag(beside.estimate.covariance)[:p]) / sigma
     np.testing.assert_array_less(grown[others], 1.1)
     np.testing.assert_array_less(grown, 2.0)
 
@@ -79,8 +81,10 @@ def test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_at
     assert found.verdict == Verdict.UNEXPLAINED
     assert found.findings == ()
     check_drawn(found)
-    # Those of a search that knew no function would name what it took back.
-    assert found.probabilities is None
+    # The search knew the function: what it says of effects holds beside it.
+    assert found.function > 0.95
+    assert found.probabilities is not None
+    assert found.probabilities.nothing > 0.5
     assert found.advice[0].kind == Kind.TRY_FORCE_EQUATION
     assert any(
         note.startswith("estimated beside an unknown function of the attitude in accel_x") for note in found.after.notes

@@ -9,13 +9,18 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
-from sdimu_calibration.core.joint.function_fit import Beside, function_sizes, needless, with_weights
+from sdimu_calibration.core.joint.function_fit import function_sizes
+from sdimu_calibration.core.joint.function_prior import FunctionPrior
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.shared_function import SharedFunction
+from sdimu_calibration.core.posterior.noise_models import usual_sizes
+from sdimu_calibration.storage.files.config import load_imu
 
 NAMES = ("gyro_bias_x", "accel_scale_x", "accel_bias_x")
 WEIGHT = np.array([1e10, 1e8, 1e7])
-SHARED = SharedFunction(AttitudeFunctions(np.eye(3)[:2]), ("gyro_x", "accel_y"), {"gyro_x": 1e-6, "accel_y": 3e-4})
+SHARED = SharedFunction(
+    AttitudeFunctions(np.eye(3)[:2]), ("gyro_x", "accel_y"), np.eye(3), {"gyro_x": 1e-6, "accel_y": 3e-4}
+)
 
 
 def recording(name: str, rng: np.random.Generator, y_of=None) -> SimpleNamespace:
@@ -61,10 +66,6 @@ def test_it_is_that_of_the_measurements_themselves(size, varying, tau):
     expected = 0.5 * (y @ y - y @ np.linalg.solve(covariance, y) - np.linalg.slogdet(covariance)[1])
     fit = fit_of(varying, tau)
     assert function_sizes(fit, reports, shared).log_likelihood(shared.size) == pytest.approx(expected, abs=1e-8)
-    gain = prior @ A.T @ np.linalg.inv(covariance)
-    told = with_weights(fit, reports, shared).estimate(fit.tau)
-    np.testing.assert_allclose(told.values, gain @ y, rtol=1e-8)
-    np.testing.assert_allclose(np.diag(told.covariance), np.diag(prior - gain @ A @ prior), rtol=1e-7)
 
 
 @pytest.mark.parametrize("tau", [[], [2e-6]])
@@ -81,14 +82,45 @@ def test_the_likeliest_size_of_a_sensor_is_the_one_that_a_step_does_not_better(t
     assert all(sizes.log_likelihood({**found, last: found[last] * step}) < best for step in (0.7, 1.4))
 
 
-def test_an_effect_stays_where_the_data_need_it_and_goes_where_they_do_not():
+def test_another_size_on_the_board_is_that_of_a_fit_in_this_size():
+    """About the estimate in one size: information, its vector and the likelihood of any other size."""
     rng = np.random.default_rng(4)
-    there = np.zeros(3 + len(SHARED.labels))
-    there[1] = 2e-3
-    reports = tuple(recording(name, rng, lambda A: A @ there) for name in "abc")
+    labels, p = SHARED.labels, len(NAMES)
+    A = rng.standard_normal((30, p + len(labels))) * np.concatenate([[1e6, 1e4, 1e4], SHARED.known**0.5 * 2.0])
+    y = rng.standard_normal(30) + 5.0
 
-    named = {"real": "accel_scale_x", "idle": "accel_bias_x"}
-    # Whether the idle one is the same in all power-ons, or differs between them.
-    for fit in (Fit(), fit_of({"bias": ("accel_bias_x",)}, [1e-6])):
-        beside = Beside(fit, reports, SHARED)  # type: ignore[arg-type]
-        assert needless(beside, named, lambda labels: -5.0 * len(labels)) == ["idle"]
+    def scored(known: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Estimate, its information, and log-likelihood of the weights up to what all sizes have in common."""
+        J, d = A.T @ A + np.diag(np.concatenate([WEIGHT, known])), A.T @ y
+        theta = np.linalg.solve(J, d)
+        return theta, J, 0.5 * (d @ theta - np.linalg.slogdet(J)[1] + np.log(known).sum())
+
+    theta, fitted, at_size = scored(SHARED.known)
+    evidence = SimpleNamespace(
+        names=(*NAMES, *labels), weight=np.concatenate([WEIGHT, SHARED.known]), shift=-theta, imu=load_imu("dtg")
+    )
+    prior = FunctionPrior(SHARED, evidence, usual_sizes(evidence.imu))  # type: ignore[arg-type]
+    of_fit = prior.nearest([SHARED.size[s] for s in SHARED.sensors])
+    assert np.allclose(prior.change(of_fit).more, 0.0, atol=1e-9 * SHARED.known.max())
+    for chosen in ((0, 0), (2, of_fit[1]), (6, 3)):
+        change = prior.change(chosen)
+        sizes = {s: float(prior.sizes[k][chosen[k]]) for k, s in enumerate(SHARED.sensors)}
+        expected, information, likelihood = scored(replace(SHARED, size=sizes).known)
+        J = fitted.copy()
+        J[change.columns, change.columns] += change.more
+        d = np.zeros(len(theta))
+        d[change.columns] -= change.more * change.values
+        step = np.linalg.solve(J, d)
+        np.testing.assert_allclose(J, information, rtol=1e-9, atol=1e-6 * np.diag(J).min())
+        np.testing.assert_allclose(theta + step, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+        explained = d @ step - change.more @ change.values**2
+        gained = 0.5 * (explained - change.log_det - np.linalg.slogdet(J)[1] + np.linalg.slogdet(fitted)[1])
+        assert gained == pytest.approx(likelihood - at_size, abs=1e-6)
+
+
+def test_a_set_without_a_function_has_no_sizes():
+    evidence = SimpleNamespace(names=NAMES, weight=WEIGHT, shift=np.zeros(3))
+    prior = FunctionPrior(None, evidence, usual_sizes(load_imu("dtg")))  # type: ignore[arg-type]
+    assert prior.counts == ()
+    assert prior.log_prior(()) == 0.0
+    assert len(prior.change(()).columns) == 0

@@ -16,7 +16,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_result import over_all_models
-from sdimu_calibration.core.joint.set_search import search_set, taken_back
+from sdimu_calibration.core.joint.set_search import search_set
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.posterior import coefficients
 from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
@@ -160,18 +160,6 @@ def test_what_all_have_and_one_has_more_of_is_told_as_both(both):
         value, sigma = of(found, name)
         assert abs(value - true) < 4.0 * sigma
     assert not any(r.noise for r in found.after.reports)
-
-
-def test_taking_back_effects_keeps_the_fault_of_one_recording(options):
-    bad = unit_set(33, [short()] * 3, ("gyro_bias_step_x(t0=400 s)=0.3 deg/h",))
-    members = (*unit_set(33, [short()] * 3).members[:2], bad.members[2])
-    found = search_set(members, options, here)
-    back = taken_back(found, options, here, [c.label for c in found.chosen])
-    assert found.local
-    assert (back.chosen, back.local, back.after.local) == ((), found.local, found.after.local)
-    assert back.standing.added == ()
-    sigma = np.sqrt(np.diag(found.after.estimate.covariance))
-    assert np.all(np.abs(back.after.estimate.values - found.after.estimate.values) < 0.02 * sigma)
 
 
 def test_one_recording_is_no_set_to_diagnose(options):

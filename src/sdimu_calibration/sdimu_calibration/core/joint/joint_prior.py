@@ -15,6 +15,7 @@ from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.filter.passes import ROOM, held_back
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
+from sdimu_calibration.core.joint.shared_function import is_weight
 
 
 def prior_weight(reports: Sequence[Report], names: Sequence[str]) -> Floats:
@@ -35,7 +36,7 @@ def prior_weight(reports: Sequence[Report], names: Sequence[str]) -> Floats:
 def widened(weight: Floats, names: Sequence[str], estimate: Floats, covariance: Floats) -> Floats:
     """Widen priors that the joint estimate contradicts, by the rule of a single one; the same array when none is.
 
-    What the site says of itself is taken at its word, and misalignments keep their prior.
+    What the site says of itself is taken at its word; misalignments and weights of a function keep their prior.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def widened(weight: Floats, names: Sequence[str], estimate: Floats, covariance: 
 
 
 def _kept(names: Sequence[str]) -> Bools:
-    """Tell the coefficients whose prior stays: misalignments, and references of the site, shape (P,)."""
+    """Tell the coefficients whose prior stays: misalignments, references of the site, weights; shape (P,)."""
     effects = map(registry.get, registry.names())
     kept = {p.name for effect in effects if effect.gauge for p in effect.parameters}.union(SITE_REFERENCES)
-    return np.array([split_tag(name)[0] in kept for name in names], dtype=bool)
+    return np.array([split_tag(name)[0] in kept or is_weight(name) for name in names], dtype=bool)

@@ -22,13 +22,14 @@ from sdimu_calibration.core.estimation.noise_learning import in_noise, with_nois
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
+from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.run_rows import RunRows
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
-from sdimu_calibration.core.joint.shared_function import SharedFunction, function_rows
+from sdimu_calibration.core.joint.shared_function import SharedFunction, beside, noise_beside
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect
 from sdimu_calibration.core.recording import DataError
@@ -80,7 +81,7 @@ class Job:
     stretches: bool = False
     """Signatures of an error of each sensor in each dwell and turn, in place of candidates."""
     function: SharedFunction | None = None
-    """Signatures of functions of the attitude in place of candidates, in noise that is learned beside them."""
+    """Whose weights are coefficients, too; noise is learned beside them."""
     rivals: bool = False
     """Also what the recording says in each noise that it may have."""
 
@@ -172,7 +173,7 @@ def fitted(job: Job) -> Fit:
         return _own(test, model, job)
     fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)
     if job.noise is None:
-        return with_noise_learned(fit)
+        return fit if job.function else with_noise_learned(fit)
     evidence = fit.bare
     return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise, held_out=False) if job.noise else fit
 
@@ -208,15 +209,14 @@ def _report(job: Job, fit: Fit) -> Report:
     shared = [selection.resolve(e) for e in tried_in_all]
     own = _local_candidates(fit) if job.with_local else []
     rivals: tuple[InOneNoise, ...] = ()
+    terms = fit.noise_terms
     if job.stretches:
         found, places = stretch_rows(fit)
-    elif job.function is not None:
-        found, places = function_rows(fit, job.function), None
     else:
-        evidence = fit.evidence([*shared, *own])
+        evidence, terms = _with_function(fit.evidence([*shared, *own]), fit, job)
         weighed = job.rivals and fit.estimator != HandheldFit.estimator
-        wander = wander_in(evidence, fit.noise_terms) if weighed or fit.noise_terms else None
-        found, places = reduced(evidence, fit.noise_terms, wander), None
+        wander = wander_in(evidence, terms) if weighed or terms else None
+        found, places = reduced(evidence, terms, wander), None
         rivals = rival_noises(evidence, wander) if weighed and wander else ()
     log = recording.temperature
     rows = _named(found, job, shared)
@@ -237,10 +237,10 @@ def _report(job: Job, fit: Fit) -> Report:
         fit.names,
         fit.values if job.about is None else np.empty(0),
         np.sqrt(np.diag(fit.covariance)) if job.about is None else np.empty(0),
-        (*recording.notes, *map(term_in_words, fit.noise_terms), *((NO_AZIMUTH,) if fit.azimuth_free else ())),
+        (*recording.notes, *map(term_in_words, terms), *((NO_AZIMUTH,) if fit.azimuth_free else ())),
         tuple(f.text for f in fit.faults if f.grave),
         _heading(fit),
-        fit.noise_terms,
+        terms,
         _widened(fit),
         places,
         fit.test.site,
@@ -248,6 +248,14 @@ def _report(job: Job, fit: Fit) -> Report:
         _equations(fit, job),
         job.scatter,
     )
+
+
+def _with_function(evidence: LinearEvidence, fit: Fit, job: Job) -> tuple[LinearEvidence, tuple[NoiseTerm, ...]]:
+    """Put the function of a job into the model of an evidence; that, and the noise beside it."""
+    if job.function is None or not isinstance(fit, NavigationFit):
+        return evidence, fit.noise_terms
+    wide = beside(evidence, job.function)
+    return wide, fit.noise_terms if job.noise is not None else noise_beside(wide, fit.wander.in_white)
 
 
 def _equations(fit: Fit, job: Job) -> RunRows | None:
@@ -289,8 +297,6 @@ def _named(found: Reduction, job: Job, shared: Sequence[Effect]) -> Reduction:
     name = job.member.name
     local = _local_names(job)
     count = sum(len(effect.parameters) for effect in shared)
-    if job.function is not None:
-        count = len(found.labels)
     labels = tuple(label if k < count else tagged(label, name) for k, label in enumerate(found.labels))
     return replace(found, names=tuple(tagged(n, name) if n in local else n for n in found.names), labels=labels)
 

@@ -1,17 +1,17 @@
 """Whether what a set leaves unexplained comes back at the same attitude, time or temperature, or not at all.
 
-Leftovers u of dwells show in scores s with information G: ``cov s = G + G K G``, K the covariance of u. Under the
-hypothesis that nothing comes back, the leftovers of two recordings are independent: each sensor of each recording has
-its own scatter from dwell to dwell and its own functions of attitude, time and temperature, the sizes by maximum
-likelihood. With ``x = (I + G K)^-1 s``, whose covariance is ``F = (I + G K)^-1 G``, the score test of a function common
-to all recordings is ``x' C x``, C the likeness of places in *different* recordings; over that in the same recordings it
-is a correlation. Where it is larger than chance makes it, by simulation of x from F, leftovers come back. Of two kinds
-that both do, one is needed where it is still larger with the other one in the hypothesis; where neither is, the
-recordings cannot tell them apart. Nor can they where the dwells of one kind have the partners that they have in
-another: both are then the answer, whatever the score of the other one.
+Leftovers u of dwells show in scores s with information G: ``cov s = G + G K G``, K the covariance of u. Each sensor of
+each recording has its own scatter from dwell to dwell and its own functions of attitude, time and temperature; of what
+comes back, it has a function besides that all recordings have in common. Each kind may come back or not: the likelihood
+of s says how probable each choice of kinds is,
 
-Sources: X. Lin, "Variance component testing in generalised linear models with random effects", Biometrika 84 (1997)
-(score test of a variance); H. Zhou et al., "MM algorithms for variance components models", J. Comput. Graph. Stat. 28
+    L = -1/2 log det(I + GK) + 1/2 s' K (I + GK)^-1 s,
+
+with the sizes of what is of each recording at their maximum and that of what is common integrated over its prior.
+Recordings in the same order do not tell attitude from time: both are then likely alike.
+
+Sources: H. Patterson, R. Thompson, "Recovery of inter-block information when block sizes are unequal", Biometrika 58
+(1971) (the likelihood); H. Zhou et al., "MM algorithms for variance components models", J. Comput. Graph. Stat. 28
 (2019) (the sizes).
 """
 
@@ -28,31 +28,34 @@ from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.leftovers import KINDS, Leftovers
+from sdimu_calibration.core.posterior.posterior import PROBABLE
 
 _LEFT = 1e-3
 """Probability that the leftovers of some sensor of a right model are so large: below it something is left."""
 _ASIDE = 0.1
 """Share of the largest mean square of a sensor (1) from which the leftovers of another one count: below is what a
 strong one leaves in the others, as an error that changes within a stop looks like a tilt."""
-_FALSE_ALARM = 0.01
-"""Share of sets in which leftovers that do not come back are said to (1): what is said sends people to the table."""
-_DRAWS = 4000
-"""Number of simulated sets of scores: chance at one in a hundred is then known to a sixth."""
-_SEED = 20240607
-"""Seed (1) of these draws: the same set has the same answer."""
-_ROUNDS = 40
-"""Number of steps to the sizes: the test changes by less than chance after half of them."""
-_FREE = 0.01
-"""Share of the variance of a score (1) that the coefficients must leave: with less they take up what comes back so."""
-_ALMOST = 0.9999
-"""Largest correlation (1): above it is rounding."""
-_OPEN = 2.0
-"""Score (sigma) from which a kind is not ruled out: chance reaches it once in forty."""
+_ODDS = 0.25
+"""Odds (1) before the data that leftovers come back with a kind: noise is what is usually left."""
+_SIZES = np.geomspace(0.1, 1e4, 16)
+"""Variances (1) that a common function may have, likely alike, over that with which a stop tells the error of a sensor:
+from a third to a hundred of its sigmas."""
+_BOTH = 0.05
+"""Probability of each of two kinds from which both together are looked at: with less they do not explain more."""
+_ROUNDS = 60
+"""Number of steps to the sizes at most: half of them are enough in most sets."""
+_STANDS = 0.01
+"""Change of the log of each size (1) below which the sizes stand: the likelihood changes by less than a thousandth."""
+_LEAST = 1e-6
+"""Variance (1, as of `_SIZES`) below which a size is none: a thousandth of the sigma of a stop."""
 _SAME_ORDER = 0.7
 """Share of dwells (1) that have one partner in both kinds, from which recordings do not tell the kinds apart: a plan in
 another order leaves a fifth, by chance."""
-_LEAST_PAIRS = 6
-"""Number of pairs of dwells below which recordings say nothing: chance makes any correlation of a few."""
+_FLAT = 0.3
+"""Change of the log-likelihood (1) with the size of a common function up to which recordings say nothing of it: it
+changes a probability by a tenth at most."""
+_OPEN = 0.2
+"""Probability that something comes back from which it is open whether it does: the prior of two kinds says .36."""
 
 
 @dataclass(frozen=True)
@@ -63,42 +66,43 @@ class Kind:
     """One of `KINDS`."""
     pairs: int
     """Pairs of dwells of different recordings that are alike."""
-    correlation: float
-    """Of leftovers that are alike, the largest of the sensors; NaN where the recordings say nothing of it."""
-    score: float
-    """The same over its sigma by chance after Fisher's transformation, the largest of the sensors and of all together.
-    """
-    sensors: tuple[str, ...]
-    """Those whose own score exceeds chance."""
+    probability: float
+    """That leftovers come back with it; NaN where the recordings say nothing of it."""
 
 
 @dataclass(frozen=True)
 class Recurrence:
     """What leftovers come back with."""
 
-    answer: tuple[str, ...]
-    """Of `KINDS`; empty where nothing comes back."""
-    apart: bool
-    """False where the recordings cannot tell the kinds of the answer apart."""
     kinds: tuple[Kind, ...]
-    limit: float
-    """Score that chance reaches in one set of a hundred, all kinds and sensors counted; NaN where the recordings share
-    too few stops."""
+    probability: float
+    """That they come back with any kind (1)."""
     sensors: tuple[str, ...]
     """Those where most is left."""
     p_value: float
     """Probability that a right model leaves so much, all sensors counted."""
 
     @property
-    def told(self) -> tuple[str, ...]:
-        """Kinds that leftovers come back with, or certainly do not."""
-        return tuple(k.kind for k in self.kinds if k.kind in self.answer or k.score < _OPEN)
+    def answer(self) -> tuple[str, ...]:
+        """Kinds that leftovers come back with; several where the recordings cannot tell them apart; none: empty."""
+        likely = tuple(k.kind for k in self.kinds if k.probability > PROBABLE)
+        open_ = tuple(k.kind for k in self.kinds if k.probability > _OPEN)
+        return likely or (open_ if self.probability > PROBABLE and len(open_) > 1 else ())
 
     @property
-    def doubtful(self) -> tuple[str, ...]:
-        """Kinds whose score is more than usual and less than chance reaches, the largest first."""
-        near = [k for k in self.kinds if k.kind not in self.answer and k.score >= _OPEN]
-        return tuple(k.kind for k in sorted(near, key=lambda k: -k.score))
+    def apart(self) -> bool:
+        """Whether the recordings tell the kinds of the answer apart."""
+        return all(k.probability > PROBABLE for k in self.kinds if k.kind in self.answer)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Kinds of which the recordings say something."""
+        return tuple(k.kind for k in self.kinds if np.isfinite(k.probability))
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is neither probable nor improbable that something comes back."""
+        return not self.answer and bool(self.told) and self.probability > _OPEN
 
 
 def recurrence(left: Leftovers) -> Recurrence | None:
@@ -120,35 +124,10 @@ def recurrence(left: Leftovers) -> Recurrence | None:
         return None
     excess = {g: tests[g].chi2 / tests[g].dof - 1.0 for g in loud}
     main = [g for g in loud if excess[g] > _ASIDE * max(excess.values())]
-    left = left.only(np.flatnonzero(np.isin(left.sensor, loud)))
-    alone = _tested(left, main, ())
-    found = [kind for kind in KINDS if alone.largest(kind) > alone.limit]
-    needed, apart = (found, True) if len(found) < 2 else _needed(left, main, found)
-    seen = [kind for kind in KINDS if np.isfinite(alone.largest(kind))]
-    answer = [kind for kind in seen if kind in needed or _in_same_order(left, kind, needed)]
-    apart = apart and len(answer) == len(needed)
-    return Recurrence(
-        tuple(answer),
-        apart,
-        tuple(_kind(left, main, alone, k) for k in KINDS),
-        alone.limit,
-        tuple(CHANNELS[g] for g in main),
-        min(1.0, len(tests) * min(t.p_value for t in tests.values())),
-    )
-
-
-def _needed(left: Leftovers, main: Sequence[int], found: Sequence[str]) -> tuple[Sequence[str], bool]:
-    """Say which of several kinds are needed beside the others, and whether they can be told apart."""
-    if any(_in_same_order(left, one, [other]) for one, other in combinations(found, 2)):
-        return found, False
-    given = {other: _tested(left, main, (other,)) for other in found}
-    needed = [k for k in found if all(t.largest(k) > t.limit for other, t in given.items() if other != k)]
-    return (needed, True) if needed else (found, False)
-
-
-def _in_same_order(left: Leftovers, kind: str, others: Sequence[str]) -> bool:
-    """Whether dwells have the same partners in a kind as in another: then nothing tells the two apart."""
-    return any(left.coincide(kind, other) > _SAME_ORDER for other in others)
+    found = _weighed(left.only(np.flatnonzero(np.isin(left.sensor, loud))), main)
+    told = [Kind(kind, left.pairs(kind), found.get(kind, float("nan"))) for kind in KINDS]
+    sensors = tuple(CHANNELS[g] for g in main)
+    return Recurrence(tuple(told), found[""], sensors, min(1.0, len(tests) * min(t.p_value for t in tests.values())))
 
 
 def _chance(left: Leftovers, group: int) -> FreeInputTest:
@@ -157,111 +136,110 @@ def _chance(left: Leftovers, group: int) -> FreeInputTest:
     return free_input_test(Information(left.gram, left.score), none, np.empty(0), mine)
 
 
+def _weighed(left: Leftovers, main: Sequence[int]) -> dict[str, float]:
+    """Probability of each kind of which the recordings say something, and of any (under an empty name).
+
+    `main` are the sensors (of `CHANNELS`) that may have a common function.
+    """
+    own = [part for g in np.unique(left.sensor) for part in _of_each(left, np.flatnonzero(left.sensor == g))]
+    alone = _fitted(left, own, np.ones(len(own)))
+    by_size = {kind: _gains(left, own, alone, main, (kind,)) for kind in KINDS}
+    said = [kind for kind, gains in by_size.items() if np.ptp(gains) > _FLAT]
+    gain: dict[tuple[str, ...], float] = {(): 0.0} | {(kind,): _mean(by_size[kind]) for kind in said}
+    probable = [kind for kind in said if _share(gain, (kind,)) > _BOTH]
+    gain |= {both: _mean(_gains(left, own, alone, main, both)) for both in combinations(probable, 2)}
+    found = {kind: sum(_share(gain, kinds) for kinds in gain if kind in kinds) for kind in said}
+    for one, other in combinations(said, 2):
+        if left.coincide(one, other) > _SAME_ORDER:
+            # What a turn leaves in the stop behind it follows the order, whatever causes it.
+            either = sum(_share(gain, kinds) for kinds in gain if one in kinds or other in kinds)
+            found |= {one: 0.5 * either, other: 0.5 * either}
+    return found | {"": 1.0 - _share(gain, ())}
+
+
+def _mean(gains: Floats) -> float:
+    """Log of the mean likelihood over all sizes (1)."""
+    return float(np.logaddexp.reduce(gains) - np.log(len(gains)))
+
+
+def _share(gain: dict[tuple[str, ...], float], kinds: tuple[str, ...]) -> float:
+    """Probability of a choice of kinds among those that were looked at, by the gain of the log-likelihood of each."""
+    score = {one: value + len(one) * np.log(_ODDS) for one, value in gain.items()}
+    most = max(score.values())
+    return float(np.exp(score[kinds] - most) / sum(np.exp(value - most) for value in score.values()))
+
+
 @dataclass(frozen=True)
-class _Test:
-    """Correlations and scores by kind, of each sensor; the last score of all together; NaN where nothing is seen."""
-
-    correlation: dict[str, Floats]
-    scores: dict[str, Floats]
-    limit: float
-
-    def largest(self, kind: str) -> float:
-        return _largest(self.scores[kind])
-
-
-def _largest(values: Floats) -> float:
-    seen = values[np.isfinite(values)]
-    return float(seen.max()) if len(seen) else float("nan")
-
-
-def _kind(left: Leftovers, main: Sequence[int], test: _Test, kind: str) -> Kind:
-    own = zip(main, test.scores[kind][:-1].tolist(), strict=True)
-    over = tuple(CHANNELS[g] for g, z in own if z > test.limit)
-    return Kind(kind, left.pairs(kind), _largest(test.correlation[kind]), test.largest(kind), over)
-
-
-@dataclass(frozen=True)
-class _Component:
+class _Part:
     """A part of the covariance of the leftovers of one sensor: places (k,) and kernel (k, k) of unit size."""
 
     places: Ints
     kernel: Floats
 
 
-def _tested(left: Leftovers, main: Sequence[int], common: Sequence[str]) -> _Test:
-    """Test every kind in the sensors `main` against leftovers that come back in the kinds `common` alone."""
-    groups = [np.flatnonzero(left.sensor == g) for g in np.unique(left.sensor)]
-    x, F = _fitted(left, [part for mine in groups for part in _components(left, mine, common)])
-    draws = np.column_stack([x, _drawn(F)])
-    asked = [np.flatnonzero(left.sensor == g) for g in main]
-    correlation, scores, chance = {}, {}, []
-    for kind in KINDS:
-        of_all = np.array([_correlation(left, kind, mine, draws) for mine in asked])
-        # Fisher's transformation makes the scatter of a correlation the same at any size.
-        even = np.arctanh(np.clip(of_all, -_ALMOST, _ALMOST))
-        even = (even - even[:, 1:].mean(axis=1)[:, None]) / even[:, 1:].std(axis=1)[:, None]
-        seen = np.isfinite(even[:, 0])
-        together = even[seen].sum(axis=0) / np.sqrt(seen.sum()) if seen.any() else np.full(draws.shape[1], np.nan)
-        every = np.vstack([even, together])
-        correlation[kind], scores[kind] = of_all[:, 0], every[:, 0]
-        chance.append(np.where(np.isfinite(every[:, 1:]), every[:, 1:], -np.inf).max(axis=0))
-    largest = np.max(chance, axis=0)
-    limit = float(np.quantile(largest, 1.0 - _FALSE_ALARM)) if np.isfinite(largest).all() else float("nan")
-    return _Test(correlation, scores, limit)
+@dataclass(frozen=True)
+class _Sizes:
+    """Variances of parts, and the log-likelihood of the scores with them (1)."""
+
+    sizes: Floats
+    log_likelihood: float
 
 
-def _components(left: Leftovers, mine: Ints, common: Sequence[str]) -> list[_Component]:
-    """Scatter of a sensor, and its functions of each kind: of each recording alone, or common to all."""
+def _of_each(left: Leftovers, mine: Ints) -> list[_Part]:
+    """Scatter of a sensor, and its functions of each kind, of each recording alone."""
     square = np.ix_(mine, mine)
     same = (left.recording[mine][:, None] == left.recording[mine][None, :]).astype(np.float64)
-    own = [_Component(mine, left.likeness[kind][square] * same) for kind in KINDS]
-    shared = [_Component(mine, left.likeness[kind][square]) for kind in common]
-    return [part for part in (_Component(mine, np.eye(len(mine))), *own, *shared) if part.kernel.any()]
+    own = [_Part(mine, left.likeness[kind][square] * same) for kind in KINDS]
+    return [part for part in (_Part(mine, np.eye(len(mine))), *own) if part.kernel.any()]
 
 
-def _fitted(left: Leftovers, parts: Sequence[_Component]) -> tuple[Floats, Floats]:
-    """Return x (m,) and its covariance F (m, m) with the sizes of the components by maximum likelihood."""
+def _gains(left: Leftovers, own: list[_Part], alone: _Sizes, main: Sequence[int], kinds: tuple[str, ...]) -> Floats:
+    """Log-likelihood (1) that common functions of some kinds add, by their size; shape of `_SIZES`."""
+    groups = [np.flatnonzero(left.sensor == g) for g in main]
+    common = [_Part(mine, left.likeness[kind][np.ix_(mine, mine)]) for mine in groups for kind in kinds]
+    if not any(part.kernel.any() for part in common):
+        return np.zeros(len(_SIZES))
+    beside = _fitted(left, [*own, *common], np.concatenate([alone.sizes, np.ones(len(common))]))
+    # Sensors and kinds differ in size; how large all of them are together nobody knows.
+    shape = np.maximum(beside.sizes[len(own) :], _LEAST)
+    shape = shape / np.exp(np.mean(np.log(shape)))
+    # Beside a small one the others are as large as alone, beside the likeliest as large as with it.
+    rest = (alone.sizes, beside.sizes[: len(own)])
+    by_size = [[_log_likelihood(left, [*own, *common], np.append(r, v * shape)) for r in rest] for v in _SIZES]
+    return np.asarray(np.max(by_size, axis=1) - alone.log_likelihood)
+
+
+def _fitted(left: Leftovers, parts: Sequence[_Part], sizes: Floats) -> _Sizes:
+    """Find the likeliest sizes of the parts, from some on."""
     m = len(left.score)
-    sizes = np.ones(len(parts))
-    x, F = left.score, left.gram
-    for turn in range(_ROUNDS + 1):
-        K = np.zeros((m, m))
-        for part, size in zip(parts, sizes.tolist(), strict=True):
-            K[np.ix_(part.places, part.places)] += size * part.kernel
-        both = np.linalg.solve(np.eye(m) + left.gram @ K, np.column_stack([left.gram, left.score]))
-        x = np.asarray(both[:, -1], dtype=np.float64)
-        F = np.asarray(0.5 * (both[:, :-1] + both[:, :-1].T), dtype=np.float64)
-        if turn == _ROUNDS:
-            break
+    for _ in range(_ROUNDS):
+        both = np.linalg.solve(
+            np.eye(m) + left.gram @ _covariance(m, parts, sizes), np.column_stack([left.gram, left.score])
+        )
+        x, F = both[:, -1], both[:, :-1]
+        change = np.ones(len(parts))
         for k, part in enumerate(parts):
             mine = part.places
             fall = float(x[mine] @ part.kernel @ x[mine])
             free = float(np.sum(part.kernel * F[np.ix_(mine, mine)]))
-            sizes[k] *= np.sqrt(max(fall, 0.0) / free) if free > 0.0 else 0.0
-    return x, F
+            change[k] = np.sqrt(max(fall, 0.0) / free) if free > 0.0 else 0.0
+        sizes = sizes * change
+        counts = sizes > _LEAST
+        if np.all(np.abs(change[counts] - 1.0) < _STANDS):
+            break
+    return _Sizes(sizes, _log_likelihood(left, parts, sizes))
 
 
-def _drawn(F: Floats) -> Floats:
-    """Draw scores x by chance, shape (m, draws)."""
-    values, vectors = np.linalg.eigh(F)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(root @ np.random.default_rng(_SEED).standard_normal((len(F), _DRAWS)))
+def _covariance(m: int, parts: Sequence[_Part], sizes: Floats) -> Floats:
+    """Covariance (m, m) of leftovers that are the sum of parts."""
+    K = np.zeros((m, m))
+    for part, size in zip(parts, sizes.tolist(), strict=True):
+        K[np.ix_(part.places, part.places)] += size * part.kernel
+    return K
 
 
-def _correlation(left: Leftovers, kind: str, mine: Ints, x: Floats) -> Floats:
-    """Correlation of the scores x (m, n) of a sensor in one recording with those in the others, shape (n,).
-
-    ``x' C x / ((R - 1) x' K x)``, C the likeness of places in different recordings, K that in the same: between -1
-    and 1, as both together are positive semidefinite. NaN where the coefficients take up all that might come back.
-    """
-    square = np.ix_(mine, mine)
-    alike, own = left.likeness[kind][square], left.gram[square]
-    same = left.recording[mine][:, None] == left.recording[mine][None, :]
-    C, K = np.where(same, 0.0, alike), np.where(same, alike, 0.0)
-    through = C @ own
-    alone = float(np.sum(C**2 * np.outer(np.diag(own), np.diag(own))))
-    few = left.pairs(kind) < _LEAST_PAIRS
-    if few or not float(np.sum(through * through.T)) > _FREE * alone:
-        return np.full(x.shape[1], np.nan)
-    across, within = (np.einsum("id,ij,jd->d", x[mine], M, x[mine], optimize=True) for M in (C, K))
-    return np.asarray(across / ((len(np.unique(left.recording)) - 1) * within))
+def _log_likelihood(left: Leftovers, parts: Sequence[_Part], sizes: Floats) -> float:
+    """Log-likelihood (1) of the scores, over that with no leftovers at all."""
+    K = _covariance(len(left.score), parts, sizes)
+    M = np.eye(len(K)) + left.gram @ K
+    return 0.5 * float(left.score @ K @ np.linalg.solve(M, left.score)) - 0.5 * float(np.linalg.slogdet(M)[1])

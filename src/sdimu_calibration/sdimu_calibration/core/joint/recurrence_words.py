@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from sdimu_calibration.core.advice import Advice
 from sdimu_calibration.core.advice import Kind as Do
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, KINDS, TEMPERATURE, TIME
-from sdimu_calibration.core.joint.recurrence import Kind, Recurrence
+from sdimu_calibration.core.joint.recurrence import Recurrence
+from sdimu_calibration.core.plain_text import listing
+from sdimu_calibration.core.probability import in_percent
 
 _WORDS = {ATTITUDE: "attitude", TIME: "time after the start", TEMPERATURE: "temperature"}
 _BELONGS = {ATTITUDE: "the sensor", TIME: "the warm-up", TEMPERATURE: "the temperature"}
@@ -29,30 +31,29 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     """
     what = "What stays unexplained" if unexplained else "What the model leaves in the stops"
     if found.answer:
-        by_kind = {k.kind: k for k in found.kinds}
-        # A kind that comes along with another one, as the order of the stops is one, has no figures that say so.
-        shown = [by_kind[kind] for kind in found.answer if by_kind[kind].score > found.limit]
-        seen = "; ".join(_figures(kind, found.limit) for kind in shown)
+        shown = " and ".join(
+            f"{_WORDS[k.kind]} ({in_percent(k.probability)})" for k in found.kinds if k.kind in found.answer
+        )
         if not found.apart:
+            told = shown.replace(" and ", " or ")
             return (
-                f"{what} comes back at the same {listed(found.answer, 'or')} ({seen}): the order of the stops in "
-                "these recordings does not tell which."
+                f"{what} comes back at the same {told}: the order of the stops in these recordings does not tell which."
             )
-        return (
-            f"{what} comes back at the same {listed(found.answer, 'and')} ({seen}): it belongs to "
-            f"{' and '.join(_BELONGS[kind] for kind in found.answer)}."
-        )
-    if found.doubtful:
-        near = next(k for k in found.kinds if k.kind == found.doubtful[0])
-        return (
-            f"Whether {what[0].lower()}{what[1:]} comes back is open: nearest is the same {_WORDS[near.kind]} "
-            f"({_figures(near, found.limit)})."
-        )
+        belongs = " and ".join(_BELONGS[kind] for kind in found.answer)
+        return f"{what} in {listing(found.sensors)} comes back at the same {shown}: it belongs to {belongs}."
     if not found.told:
         return f"Whether {what[0].lower()}{what[1:]} comes back cannot be told: the recordings share too few stops."
+    if found.is_open:
+        near = max((k for k in found.kinds if k.kind in found.told), key=lambda k: k.probability)
+        of_all, of_near = in_percent(found.probability), in_percent(near.probability)
+        thing = f"{what[0].lower()}{what[1:]}"
+        return f"Whether {thing} comes back is open ({of_all}): nearest is the same {_WORDS[near.kind]} ({of_near})."
     of_each = ": it belongs to each run" if {ATTITUDE, TIME} <= set(found.told) else ""
     where = f"{' in the stops' if unexplained else ''} ({', '.join(found.sensors)})"
-    return f"{what}{where} does not come back at the same {listed(found.told, 'or')}{of_each}."
+    return (
+        f"{what}{where} does not come back at the same {listed(found.told, 'or')} "
+        f"(that it does: {in_percent(found.probability)}){of_each}."
+    )
 
 
 def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]:
@@ -69,18 +70,11 @@ def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]
         return []
     if found.answer:
         return [_NEXT[kind] for kind in found.answer] if found.apart else [Advice(Do.REVERSE_AND_ADD)]
-    if ATTITUDE not in found.told or found.doubtful:
+    if ATTITUDE not in found.told or found.is_open:
         return [Advice(Do.REVERSE_AND_ADD)]
     return [Advice(Do.LOOK_AT_MOUNT)]
 
 
-def _figures(one: Kind, limit: float) -> str:
-    """Name the sensors of a kind, how well recordings agree, and what chance does."""
-    where = f"{', '.join(one.sensors)}: " if one.sensors else ""
-    return f"{where}correlation {one.correlation:.2f}, {one.score:.1f} sigma where chance ends at {limit:.1f}"
-
-
 def listed(kinds: Sequence[str], between: str) -> str:
     """Name kinds in their order, the last two with a word between them."""
-    words = [_WORDS[kind] for kind in KINDS if kind in kinds]
-    return f" {between} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    return listing([_WORDS[kind] for kind in KINDS if kind in kinds], between)

@@ -19,6 +19,7 @@ from sdimu_calibration.core.evidence.in_stops import InStops
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.evidence.wander import Wander
+from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 _ROUNDING = 1e-12
@@ -97,7 +98,7 @@ def kept_and_others(evidence: LinearEvidence) -> tuple[Ints, Ints]:
         Columns of the evidence.
     """
     own = evidence.names[: len(evidence.weight)]
-    apart = [k < evidence.coefficients or name in SITE_REFERENCES for k, name in enumerate(own)]
+    apart = [k < evidence.coefficients or name in SITE_REFERENCES or is_weight(name) for k, name in enumerate(own)]
     return np.flatnonzero(apart), np.flatnonzero(np.logical_not(apart))
 
 

@@ -14,6 +14,7 @@ from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
+from sdimu_calibration.core.joint.function_prior import FunctionPrior
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
@@ -29,6 +30,8 @@ _NEAR = 6.0
 _HOPELESS = 10.0
 """Log posterior (1) behind nothing from which a candidate of one recording is left out: a window holds what is within 7
 of the best model, and all that is left out weighs a hundredth together."""
+FUNCTION = "function"
+"""Key of a function among the sizes of a noise."""
 _SWEEPS = 4
 """Number of times that the noise of each recording is chosen in turn: they hang on each other by the coefficients
 alone, which each recording knows well."""
@@ -39,11 +42,11 @@ class SetNoise(NoiseModel):
     """Noise of a set: that of each recording."""
 
     chosen: tuple[int, ...] = ()
-    """Place of each among the noises of its recording."""
+    """Place of each among the noises of its recording, then of the size of each sensor's function; 0 is none."""
     own: tuple[NoiseModel, ...] = ()
     """Of each recording, in the order of the reports."""
     log_prior_of_all: float = 0.0
-    """Of all of them together, beside white noise in all (1)."""
+    """Of all of them together, beside white noise in all and no function (1)."""
 
     @property
     def log_prior(self) -> float:
@@ -52,8 +55,14 @@ class SetNoise(NoiseModel):
 
     @cached_property
     def sizes(self) -> Mapping[Hashable, float]:
-        """Size of each term (SI), by its recording and what it is."""
-        return {(k, t.identity): t.size for k, noise in enumerate(self.own) for t in noise.terms}
+        """Size of each term (SI), by its recording and what it is; of a function its place: its sizes count apart."""
+        terms = {(k, t.identity): t.size for k, noise in enumerate(self.own) for t in noise.terms}
+        return terms | {(FUNCTION, k, size): size for k, size in enumerate(self.function) if size}
+
+    @property
+    def function(self) -> tuple[int, ...]:
+        """Place of the size of each sensor's function."""
+        return self.chosen[len(self.own) :]
 
 
 @dataclass(frozen=True)
@@ -106,7 +115,9 @@ class SetBoard(Board[SetEvidence]):
         components = columns_of(fit.varying, fit.names) if fit.turn_on else []
         self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
-        self._white = (0,) * len(self.rivals)
+        self.functions = FunctionPrior(fit.function, evidence, usual_sizes(evidence.imu))
+        self._counts = (*map(len, self.rivals), *self.functions.counts)
+        self._white = (0,) * len(self._counts)
         self._found: dict[Members, dict[tuple[int, ...], float]] = {}
         self._usual = usual_sizes(evidence.imu)
         self._told = len(evidence.weight) + np.arange(len(told))
@@ -114,8 +125,8 @@ class SetBoard(Board[SetEvidence]):
 
     @property
     def has_noises(self) -> bool:
-        """Whether noise with a memory may be in a model."""
-        return any(len(own) > 1 for own in self.rivals)
+        """Whether noise with a memory, or a function, may be in a model."""
+        return any(count > 1 for count in self._counts)
 
     @cached_property
     def use(self) -> Ints:
@@ -182,8 +193,8 @@ class SetBoard(Board[SetEvidence]):
         def swept(best: tuple[int, ...]) -> tuple[int, ...]:
             for _ in range(_SWEEPS):
                 before = best
-                for k, own in enumerate(self.rivals):
-                    best = max((_changed(best, k, other) for other in range(len(own))), key=score)
+                for k, count in enumerate(self._counts):
+                    best = max((_changed(best, k, other) for other in range(count)), key=score)
                 if best == before:
                     break
             return best
@@ -202,10 +213,10 @@ class SetBoard(Board[SetEvidence]):
         out = []
         for kind in sorted(set.intersection(*(set().union(*own) for own in kinds))):
             chosen = []
-            for own, place in zip(kinds, best, strict=True):
+            for own, place in zip(kinds, best, strict=False):
                 having = [j for j, one in enumerate(own) if kind in one]
                 chosen.append(min(having, key=lambda j: (len(own[j] ^ (own[place] | {kind})), j)))
-            out.append(tuple(chosen))
+            out.append((*chosen, *best[len(self.rivals) :]))
         return out
 
     def squares(self, noise: NoiseModel) -> tuple[float, int]:
@@ -263,12 +274,15 @@ class SetBoard(Board[SetEvidence]):
             every = [{t.identity: np.log(t.size) for t in one.noise.terms} for one in self.rivals[k]]
             same = [j for j, one in enumerate(every) if one.keys() == wanted.keys()]
             chosen[k] = min(same, key=lambda j: sum(abs(every[j][i] - wanted[i]) for i in wanted), default=chosen[k])
+        if fit.function is not None:
+            chosen[len(self.rivals) :] = self.functions.nearest([fit.function.size[s] for s in fit.function.sensors])
         return self._noise(tuple(chosen))
 
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
-        own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=True))
+        own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=False))
         terms = tuple(t for noise in own for t in noise.terms)
-        return SetNoise(terms, (), chosen, own, log_prior_of_set(own, self._usual))
+        prior = log_prior_of_set(own, self._usual) + self.functions.log_prior(chosen[len(own) :])
+        return SetNoise(terms, (), chosen, own, prior)
 
     def _chosen(self, noise: NoiseModel) -> tuple[int, ...]:
         return noise.chosen if isinstance(noise, SetNoise) else self._white
@@ -297,7 +311,8 @@ class SetBoard(Board[SetEvidence]):
             J[np.ix_(at, at)] += one.J
             d[at] += one.d
             explained, log_det = explained + one.explained, log_det + one.log_det
-        return self._about(_Share(J, d, explained, log_det), place, len(columns))
+        about = self._about(_Share(J, d, explained, log_det), place, len(columns))
+        return self._in_sizes(about, chosen[len(self.rivals) :], columns)
 
     def _of_power_on(self, recordings: Sequence[InOneNoise], place: Mapping[str, int]) -> tuple[Ints, _Share]:
         """Put together what the recordings of one power-on say of parameters.
@@ -341,6 +356,15 @@ class SetBoard(Board[SetEvidence]):
         point[: len(self.evidence.weight)] = -self.evidence.shift
         moved = J @ point
         return _Share(J, d - moved, one.explained + float(2.0 * d @ point - point @ moved), one.log_det)
+
+    def _in_sizes(self, one: _Share, sizes: Sequence[int], columns: Ints) -> _Share:
+        """Give the weights of the function the prior of some sizes; all of them are among the columns."""
+        change = self.functions.change(sizes)
+        at = np.array([columns.tolist().index(k) for k in change.columns], dtype=np.int64)
+        one.J[at, at] += change.more
+        one.d[at] -= change.more * change.values
+        squares = float(change.more @ change.values**2)
+        return _Share(one.J, one.d, one.explained - squares, one.log_det + change.log_det)
 
 
 def _changed(chosen: tuple[int, ...], place: int, other: int) -> tuple[int, ...]:

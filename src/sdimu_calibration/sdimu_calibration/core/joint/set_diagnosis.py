@@ -19,7 +19,7 @@ from sdimu_calibration.core.effects.references import LATITUDE, SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
-from sdimu_calibration.core.joint.function_fit import Beside, needless, with_function
+from sdimu_calibration.core.joint.function_fit import unknown_functions, with_function
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
@@ -28,11 +28,11 @@ from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_set, taken_back
-from sdimu_calibration.core.joint.set_standing import standing_beside
+from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_beside, search_set
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, sentence, verdict_of_set
-from sdimu_calibration.core.plain_text import first_of
+from sdimu_calibration.core.plain_text import first_of, listing
 from sdimu_calibration.core.plan_search import Question
+from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail
@@ -41,10 +41,6 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.core.wording import Work
-
-_SHARED = 10.0
-"""Log-likelihood (1) that a function of the attitude must add where something is left: its odds, 1 in 50, and those of
-its size cost less."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +68,10 @@ class SetDiagnosis:
     """Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
     them. By itself that model learns in each recording what it lacks as noise, and its own error hides it."""
     probabilities: Probabilities | None = None
-    """Of nothing, and of each family of effects in all recordings, at the end of the search; None where an unknown
-    function of the attitude explains what is left, which the search did not know, and where the search did not come to
-    an end."""
+    """Of nothing, and of each family of effects in all recordings, at the end of the search; None where it did not come
+    to an end."""
+    function: float = 0.0
+    """Probability that an unknown function of the attitude is in all recordings; 0 where none was looked for."""
     unknown: tuple[UnknownFunction, ...] = ()
     """The function of the attitude that explains what is left, at all stops; empty without one."""
 
@@ -92,25 +89,23 @@ def diagnose_set(
         raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
-    before = set_outcome(found.before)
-    after = before if found.after is found.before else set_outcome(found.after)
-    after = averaged(after, found.after, found.posterior) if found.stood else after
     again = recurrence(leftovers(found.after, run))
-    told = probabilities(found.posterior) if found.stood else None
-    facts = SetFacts(_findings(found), after, found.after, again, told)
-    word = verdict_of_set(facts)
+    before, facts = set_outcome(found.before), _facts(found, again)
     refused: tuple[SetFinding, ...] = ()
-    why = "" if found.stood else f"{TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}."
+    why = ""
     # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
     shared = again is not None and not again.answer and not facts.is_of_some
-    asked = again is not None and (shared or ATTITUDE in again.answer)
-    beside = with_function(found.after, again.sensors, run) if again and asked else Beside(found.after)
-    if again is not None and beside.gain > _SHARED:
-        found, beside, needed_not = _beside_function(found, beside, again, options, run)
-        refused = tuple(f for f in facts.findings if f.tag in needed_not)
-        why = f"{_explained(again, needed_not)} {why}".strip()
-        facts = SetFacts(_findings(found), set_outcome(found.after), found.after, again, None)
-        word = verdict_of_set(facts)
+    if again is not None and (shared or ATTITUDE in again.answer):
+        beside = with_function(found.after, again.sensors, run)
+        beside_it = search_beside(found, beside, options, run, extra, progress) if beside.function else found
+        if beside_it.function > PROBABLE:
+            found, earlier = beside_it, facts.findings
+            facts = _facts(found, again)
+            tags = {f.tag for f in facts.findings}
+            refused = tuple(f for f in earlier if f.tag not in tags)
+            why = _explained(again, found.with_function, [f.tag for f in refused])
+    word = verdict_of_set(facts)
+    why = why if found.stood else f"{why} {TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}.".strip()
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     steps = next_steps(again, facts.beside_function)
@@ -129,34 +124,25 @@ def diagnose_set(
         refused,
         _error_without(found),
         facts.told,
-        beside.unknown if facts.beside_function else (),
+        found.function if facts.beside_function else 0.0,
+        unknown_functions(found.after),
     )
 
 
-def _beside_function(
-    found: SetSearch, beside: Beside, again: Recurrence, options: SetOptions, run: Run
-) -> tuple[SetSearch, Beside, list[str]]:
-    """Estimate what was found beside a function of the attitude, without the effects that it explains; their labels.
-
-    An effect that imitates an unknown function was found as nothing else was there to take it up.
-    """
-    board, fit = found.posterior.board, found.after
-    number = {found.posterior.candidate(k).label: k for k in range(len(board.use))}
-    names = {c.label: fit.names[place_of(fit.names, c)] for c in found.chosen if c.label in number}
-    names |= {one.label: fit.names[place_of_local(fit.names, one)] for one in found.local if one.label in number}
-    labels = needless(beside, names, lambda kept: board.prior.log_of([number[label] for label in kept]))
-    if labels:
-        found = taken_back(found, options, run, labels)
-        beside = with_function(found.after, again.sensors, run)
-    return replace(found, after=beside.fit, standing=standing_beside(beside.fit, found.chosen)), beside, labels
+def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
+    """Put together what the verdict follows from: the estimate is that over all models where the search has an end."""
+    after = set_outcome(found.after)
+    after = averaged(after, found.after, found.posterior) if found.stood else after
+    told = probabilities(found.posterior) if found.stood else None
+    return SetFacts(_findings(found), after, found.after, again, told)
 
 
-def _explained(again: Recurrence, labels: Sequence[str]) -> str:
-    """Say what an unknown function explains; labels of one recording have its name behind."""
+def _explained(again: Recurrence, sensors: Sequence[str], labels: Sequence[str]) -> str:
+    """Say what an unknown function of some sensors explains; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
     too = f" It also explains {', '.join(names)}: not told." if names else ""
     of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
-    where = " and ".join(again.sensors)
+    where = listing(sensors)
     return f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.{too}"
 
 

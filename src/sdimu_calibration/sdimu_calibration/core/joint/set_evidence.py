@@ -22,6 +22,7 @@ from sdimu_calibration.core.joint.joint_prior import prior_weight
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.probability import squares_tail
 
 MOST_FOLDS = 50
@@ -79,7 +80,7 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
         prior=prior,
         imu=imu,
         times=fit.reports[0].times,
-        coefficients=P,
+        coefficients=P - sum(map(is_weight, fit.names)),
     )
 
 

@@ -28,7 +28,7 @@ from sdimu_calibration.core.joint.set_order import (
     check_one_site,
     in_order,
 )
-from sdimu_calibration.core.joint.shared_function import SharedFunction
+from sdimu_calibration.core.joint.shared_function import SharedFunction, is_weight
 from sdimu_calibration.core.joint.shared_scatter import shared_scatter
 from sdimu_calibration.core.joint.turn_on import in_scatter, turn_on_scatter
 from sdimu_calibration.core.progress import Progress, silent
@@ -125,7 +125,7 @@ class SetFit:
         row = self.power_ons.index(power_on(report))
         for name, deviation in zip(self.varying_names, self.estimate.deviation[row].tolist(), strict=True):
             values[name] += deviation
-        return {name: v for name, v in values.items() if split_tag(name)[1] in {"", report.name}}
+        return {n: v for n, v in values.items() if split_tag(n)[1] in {"", report.name} and not is_weight(n)}
 
 
 def power_on(report: Report) -> str:
@@ -188,7 +188,8 @@ def fit_set(
         late = {r.name: r for r in reports if not r.stands_alone}
         left |= dict.fromkeys(late, "")
         reports = firm
-    fit = _combined(members, options, reports)
+    function = None if before is None else before.function
+    fit = _combined(members, options, reports, function)
     for turn in range(_MOST_ROUNDS):
         progress("joint fit", 0.5 + 0.1 * turn)
         again = [m for m in members if m.name in left or _moved(fit, m.name)]
@@ -202,7 +203,7 @@ def fit_set(
         left = lost
         kept = {r.name: with_own(came.get(r.name, r), r) for r in fit.reports}
         reports = [kept.get(m.name) or came[m.name] for m in members if m.name in kept or m.name in came]
-        fit = _combined(members, options, reports)
+        fit = _combined(members, options, reports, function)
         if stuck:
             break
     if left and len(fit.reports) < 2:
@@ -265,12 +266,13 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
         take up what the point leaves.
     """
     local = tuple(options.local.get(member.name, ()))
+    function = None if about is None else about.function
     if about is None:
         return Job(member, options.model, estimator or options.estimator, local)
     report = next((r for r in about.reports if r.name == member.name), None)
     if report is not None and local != tuple(about.local.get(member.name, ())):
         # What is new in it alone may be far outside its prior, which its own fit widens: else noise takes the rest.
-        return Job(member, options.model, report.estimator, local, imu=report.imu)
+        return Job(member, options.model, report.estimator, local, imu=report.imu, function=function)
     if report is not None:
         return Job(
             member,
@@ -284,9 +286,11 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
             report.start,
             None if learn else report.noise,
             report.scatter,
+            function=function,
         )
     values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
-    return Job(member, options.model, estimator or about.reports[0].estimator, local, about=values, noise=())
+    estimator = estimator or about.reports[0].estimator
+    return Job(member, options.model, estimator, local, about=values, noise=(), function=function)
 
 
 def asked_again(fit: SetFit, run: Run, places: Sequence[int] | None = None, **wanted: Any) -> list[Report]:
@@ -310,12 +314,18 @@ def asked_again(fit: SetFit, run: Run, places: Sequence[int] | None = None, **wa
 
 
 def with_own(fresh: Report, old: Report | None) -> Report:
-    """Keep what a recording's own fit says beside rows about other coefficients: its values, and priors it widened."""
+    """Keep what a recording's own fit says beside rows about other coefficients: its values, and priors it widened.
+
+    How well it is fitted is said without a function that all recordings share.
+    """
     if old is None or len(fresh.values):
         return fresh
-    known = dict(zip(old.reduction.names, old.reduction.weight.tolist(), strict=True))
+    own = old.reduction
+    known = {n: w for n, w in zip(own.names, own.weight.tolist(), strict=True) if not is_weight(n)}
     pairs = zip(fresh.reduction.names, fresh.reduction.weight.tolist(), strict=True)
     rows = replace(fresh.reduction, weight=np.array([known.get(name, weight) for name, weight in pairs]))
+    if any(map(is_weight, rows.names)):
+        fresh = replace(fresh, statistics=old.statistics)
     return replace(
         fresh, reduction=rows, values=old.values, sigma=old.sigma, heading_rad=old.heading_rad, widened=old.widened
     )
@@ -337,10 +347,11 @@ def _one_estimator(members: Sequence[Member], options: SetOptions, reports: Sequ
 
 
 def joint_names(reports: Sequence[Report]) -> tuple[str, ...]:
-    """Coefficients that all recordings share, in their order, then those of single recordings."""
-    names = dict.fromkeys(n for r in reports for n in r.reduction.names)
+    """Coefficients that all recordings share, in their order, then those of single ones, then weights of a function."""
+    every = dict.fromkeys(n for r in reports for n in r.reduction.names)
+    names = [n for n in every if not is_weight(n)]
     shared = [n for n in names if not split_tag(n)[1]]
-    return (*shared, *(n for n in names if split_tag(n)[1]))
+    return (*shared, *(n for n in names if split_tag(n)[1]), *(n for n in every if is_weight(n)))
 
 
 def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -385,7 +396,9 @@ def columns_of(varying: Mapping[str, tuple[str, ...]], names: Sequence[str]) -> 
     return [Component(effect, places(own)) for effect, own in varying.items()]
 
 
-def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[Report]) -> SetFit:
+def _combined(
+    members: Sequence[Member], options: SetOptions, reports: Sequence[Report], function: SharedFunction | None
+) -> SetFit:
     reports = in_order(reports)
     names = joint_names(reports)
     varying = varying_effects(options.model, options.scopes, names)
@@ -402,6 +415,7 @@ def _combined(members: Sequence[Member], options: SetOptions, reports: Sequence[
         weight,
         turn_on,
         asked=tuple(by_name),
+        function=function,
     )
 
 
@@ -438,8 +452,9 @@ def with_reports(fit: SetFit, reports: Sequence[Report]) -> SetFit:
     reports : sequence of Report
         In the order of its own.
     """
-    estimate, weight, turn_on = _estimated(reports, fit.names, fit.varying)
-    return replace(fit, reports=tuple(reports), estimate=estimate, weight=weight, turn_on=turn_on)
+    names = joint_names(reports)
+    estimate, weight, turn_on = _estimated(reports, names, fit.varying)
+    return replace(fit, reports=tuple(reports), names=names, estimate=estimate, weight=weight, turn_on=turn_on)
 
 
 def _moved(fit: SetFit, name: str) -> bool:
@@ -448,11 +463,13 @@ def _moved(fit: SetFit, name: str) -> bool:
     if report is None or report.estimator == HandheldFit.estimator:
         return False
     values, own = fit.values_of(report), report.reduction
-    far = np.abs(np.array([values[n] for n in own.names]) - own.point)
+    # Weights of a function are linear anywhere.
+    kept = [k for k, n in enumerate(own.names) if not is_weight(n)]
+    far = np.abs(np.array([values[own.names[k]] for k in kept]) - own.point[kept])
     if report.estimator == SecondOrderFit.estimator or not report.stands_alone:
-        places = [fit.names.index(n) for n in own.names]
+        places = [fit.names.index(own.names[k]) for k in kept]
         sigma = np.sqrt(np.diag(fit.estimate.covariance)[places])
         return bool(np.any(far > _NEAR * sigma))
     p = len(own.names)
     sigma = np.sqrt(np.diag(Combination([Rows(own.A[:, :p], own.y)], own.weight, []).estimate(np.empty(0)).covariance))
-    return bool(np.any(far > _FAR * sigma))
+    return bool(np.any(far > _FAR * sigma[kept]))

@@ -25,7 +25,7 @@ from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.noise_term import may_be_an_effect, unexplained
 from sdimu_calibration.core.note import Note, Topic, prefixed
 from sdimu_calibration.core.origin import Origin, measured
-from sdimu_calibration.core.plain_text import first_of
+from sdimu_calibration.core.plain_text import first_of, listing
 from sdimu_calibration.core.posterior.coefficients import Averages
 from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.results import (
@@ -186,7 +186,7 @@ def _beside(fit: SetFit) -> list[str]:
     if fit.function is None:
         return []
     sizes = [f"{s} of {_size(s, v)}" for s, v in fit.function.size.items()]
-    return [f"estimated beside an unknown function of the attitude in {' and '.join(sizes)} that all recordings share"]
+    return [f"estimated beside an unknown function of the attitude in {listing(sizes)} that all recordings share"]
 
 
 def _size(sensor: str, size: float) -> str:
@@ -358,7 +358,7 @@ def over_all_models(fit: SetFit, window: Posterior[SetEvidence]) -> SetFit:
     means = fit.base.dwell_means
     one = Averages(board.as_stated, means).of_model(told, noise)
     all_ = Averages(board, means).of(window)
-    own = np.array([fit.names.index(name) for name in board.known[: len(board.evidence.weight)]], dtype=np.int64)
+    own = np.array([fit.names.index(name) for name in board.known[: board.evidence.coefficients]], dtype=np.int64)
     values, covariance = fit.estimate.values.copy(), fit.estimate.covariance.copy()
     values[own] += all_.mean - one.mean
     covariance[np.ix_(own, own)] += none_below_zero(all_.covariance - one.covariance, np.sqrt(np.diag(one.covariance)))

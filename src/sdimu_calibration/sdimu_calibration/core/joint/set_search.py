@@ -23,13 +23,14 @@ from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
+from sdimu_calibration.core.joint.function_fit import in_size
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
-from sdimu_calibration.core.joint.set_board import SetBoard
+from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
 from sdimu_calibration.core.joint.set_standing import set_standing
-from sdimu_calibration.core.posterior.posterior import Posterior
+from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
 
@@ -92,6 +93,27 @@ class SetSearch:
     stood: bool
     """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
 
+    @property
+    def told(self) -> tuple[Candidate, ...]:
+        """What was found, in all recordings or in one."""
+        return (*self.chosen, *(_of_one(one.label) for one in self.local))
+
+    @property
+    def function(self) -> float:
+        """Probability that an unknown function of the attitude is in all recordings (1)."""
+        return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and any(noise.function))
+
+    @property
+    def with_function(self) -> tuple[str, ...]:
+        """Sensors that more likely than not have such a function."""
+        shared = self.after.function
+        window = self.posterior
+
+        def of(k: int) -> float:
+            return window.of_any_noise(lambda noise: isinstance(noise, SetNoise) and noise.function[k : k + 1] > (0,))
+
+        return () if shared is None else tuple(s for k, s in enumerate(shared.sensors) if of(k) > PROBABLE)
+
 
 def search_set(
     members: Sequence[Member],
@@ -114,10 +136,42 @@ def search_set(
     fitted : SetFit, optional
         The set with the model as given, where it was fitted already.
     """
-    before = fit = fitted or fit_set(members, options, run, progress=progress)
-    told: tuple[Candidate, ...] = ()
+    before = fitted or fit_set(members, options, run, progress=progress)
+    return _searched(before, before, (), options, run, extra, progress)
+
+
+def search_beside(
+    found: SetSearch,
+    fit: SetFit,
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+) -> SetSearch:
+    """Search again where a fit has a function that all recordings share; what was found is a candidate again.
+
+    Parameters
+    ----------
+    fit : SetFit
+        With the function and with what was found.
+    """
+    again = _searched(found.before, fit, found.told, options, run, extra, progress)
+    return replace(again, first=found.first, threshold=found.threshold)
+
+
+def _searched(
+    before: SetFit,
+    fit: SetFit,
+    told: tuple[Candidate, ...],
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect],
+    progress: Progress,
+) -> SetSearch:
+    """Search about a fit with what is told, until the choice stands."""
+    members = before.members
     finer: tuple[Effect, ...] = ()
-    seen: set[frozenset[str]] = {frozenset()}
+    seen: set[frozenset[str]] = {frozenset(c.label for c in told)}
     found: Search[SetEvidence] | None = None
     first: Search[SetEvidence] | None = None
     stood = False
@@ -142,7 +196,7 @@ def search_set(
             break
         seen.add(labels)
         told = chosen
-        fit = fit_set(members, _with(options, told), run, fit, progress)
+        fit = in_size(fit_set(members, _with(options, told), run, fit, progress))
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
     return _result(before, fit, told, evidence, (first, found), stood)
@@ -253,31 +307,6 @@ def _first_ones(fit: SetFit, found: Search[SetEvidence], told: Sequence[Candidat
     if len(new) > 1 and (z[new[0]] > _STRONG or worst > _FAILS):
         chosen = [c for c in chosen if c.label not in new[1:]]
     return tuple(chosen)
-
-
-def taken_back(found: SetSearch, options: SetOptions, run: Run, labels: Sequence[str]) -> SetSearch:
-    """Return the search as if it had not chosen some effects.
-
-    Parameters
-    ----------
-    run : callable
-        Does the jobs.
-    labels : sequence of str
-        Of the effects, with the name of the recording behind those of one.
-    """
-    kept = [c for c in found.chosen if c.label not in labels]
-    local = tuple(one for one in found.local if one.label not in labels)
-    own = [_of_one(one.label) for one in local]
-    fit = found.before
-    if kept or own:
-        fit = fit_set(fit.members, _with(options, [*kept, *own]), run, fit)
-    shared = {c.label: c for c in kept}
-    alike = {label: found.alike[label] for label in shared}
-    standing = found.standing if kept else set_standing(fit, set_evidence(fit, ()), {}, {})
-    z = tuple(z for c, z in zip(found.chosen, found.z, strict=True) if c.label in shared)
-    probability = {label: found.probability[label] for label in shared}
-    told = replace(found, after=fit, chosen=tuple(kept), z=z, alike=alike, probability=probability)
-    return replace(told, local=local, standing=standing)
 
 
 def _singles(evidence: SetEvidence) -> Ints:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing, class_of, is_lasting, known_of
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values, set_evidence
+from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
 
 
@@ -53,23 +53,3 @@ def set_standing(
         tuple(classes),
         fit.reports[0].imu.name,
     )
-
-
-def standing_beside(fit: SetFit, kept: Sequence[Candidate]) -> Standing:
-    """Say what a set knows of the unit where its estimate stands beside an unknown function.
-
-    Parameters
-    ----------
-    kept : sequence of Candidate
-        What was found in all recordings.
-    """
-    evidence, chosen = set_evidence(fit, ()), {c.label: c for c in kept}
-    if own_values(fit.names):
-        return set_standing(fit, evidence, chosen, {})
-    # The rows of the recordings know no function: these, one a coefficient, say what the estimate does.
-    sigma = np.sqrt(np.diag(fit.estimate.covariance))
-    even = np.linalg.inv(fit.estimate.covariance / np.outer(sigma, sigma)) - np.diag(fit.weight * sigma**2)
-    values, vectors = np.linalg.eigh(even)
-    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T / sigma
-    beside = replace(evidence, W=rows, e=np.zeros(len(rows)), stop=np.zeros(len(rows), dtype=np.int64))
-    return set_standing(fit, beside, chosen, {})

@@ -75,8 +75,7 @@ class SetFacts:
     again: Recurrence | None
     """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     told: Probabilities | None
-    """None where the search did not know the function of the attitude that explains the set, or did not come to an end.
-    """
+    """None where the search did not come to an end."""
 
     @property
     def beside_function(self) -> bool:

@@ -1,8 +1,8 @@
-"""An unknown function of the attitude that all recordings of a set have in common, in the rows of one recording.
+"""An unknown function of the attitude that all recordings of a set have in common, among the coefficients of a set.
 
-Each of some sensors has an error that is a sum of functions of the attitude, with weights of one unknown size that all
-recordings share. Each recording learns the noise of its own beside it: alone it takes the function for noise, which
-averages away, as a function does not.
+Each of some sensors has an error that is a sum of functions of the attitude. The weights of the functions are
+coefficients of all recordings, normal with an unknown size. Each recording learns the noise of its own beside them:
+alone it takes the function for noise, which averages away, as a function does not.
 """
 
 from __future__ import annotations
@@ -14,12 +14,17 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
-from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.learned_noise import learn
-from sdimu_calibration.core.joint.reduction import Reduction, reduced
+from sdimu_calibration.core.evidence.linear import E, LinearEvidence
+from sdimu_calibration.core.evidence.wander import Wander
+from sdimu_calibration.core.noise_term import NoiseTerm
+
+_WEIGHT = " function "
+"""What the name of a weight has between those of its sensor and its function."""
+_FREE = 1.0
+"""Size (rad/s, m/s^2) of a weight where none is known yet: the data alone decide."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +34,15 @@ class SharedFunction:
     functions: AttitudeFunctions
     sensors: tuple[str, ...]
     """Those that have them, in the order of `CHANNELS`."""
+    stops: Floats
+    """Direction of the force in b (1) at the stops of the recordings, shape (n, 3)."""
     size: Mapping[str, float]
     """One-sigma of the weights of a sensor (rad/s, m/s^2); empty where nobody knows it yet."""
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Name of each weight: function by function, of each the sensors."""
-        return tuple(f"{sensor} function {k}" for k in range(len(self.functions)) for sensor in self.sensors)
+        return tuple(f"{sensor}{_WEIGHT}{k}" for k in range(len(self.functions)) for sensor in self.sensors)
 
     def of(self, sensor: str) -> Bools:
         """Tell the weights of a sensor from the others.
@@ -55,25 +62,42 @@ class SharedFunction:
         ndarray, shape (m,)
             (1/SI^2).
         """
-        return np.tile([self.size[sensor] ** -2.0 for sensor in self.sensors], len(self.functions))
+        return np.tile([self.size.get(sensor, _FREE) ** -2.0 for sensor in self.sensors], len(self.functions))
 
 
-def function_rows(fit: Fit, shared: SharedFunction) -> Reduction:
-    """Compress what a recording says of its coefficients and of the weights, in the noise that it has beside them.
+def is_weight(name: str) -> bool:
+    """Tell a weight of a function from coefficients by its name."""
+    return _WEIGHT in name
+
+
+def beside(evidence: E, shared: SharedFunction) -> E:
+    """Put the weights of a function into the model of a recording's evidence, behind its parameters.
 
     Parameters
     ----------
-    fit : Fit
-        In white noise; that is the noise where no size is known.
+    evidence : LinearEvidence
+        N rows; the weights are zero at its calibration.
     """
-    evidence = fit.bare
     own = len(evidence.weight)
-    columns = evidence.signature(shared.functions.effects()).reshape(len(evidence.e), -1, len(CHANNELS))
-    kept = [c in shared.sensors for c in CHANNELS]
-    W = np.hstack([evidence.W[:, :own], columns[:, :, kept].reshape(len(evidence.e), -1)])
-    wide = replace(evidence.only(np.empty(0, dtype=np.int64)), W=W, names=(*evidence.names[:own], *shared.labels))
-    if not shared.size or not isinstance(fit, NavigationFit):
-        return reduced(wide)
-    wander, weight = fit.wander.in_white, np.concatenate([evidence.weight, shared.known])
-    information = Joint.of(wide, wander).on_wander(np.arange(len(weight)), weight)
-    return reduced(wide, learn(information, wander.cut))
+    of_all = evidence.signature(shared.functions.effects()).reshape(len(evidence.e), -1, len(CHANNELS))
+    columns = of_all[:, :, [c in shared.sensors for c in CHANNELS]].reshape(len(evidence.e), -1)
+    return replace(
+        evidence,
+        W=np.hstack([evidence.W[:, :own], columns, evidence.W[:, own:]]),
+        names=(*evidence.names[:own], *shared.labels, *evidence.names[own:]),
+        weight=np.concatenate([evidence.weight, shared.known]),
+        shift=np.concatenate([evidence.shift, np.zeros(len(shared.labels))]),
+        stated=np.concatenate([evidence.stated, shared.known**-0.5]),
+    )
+
+
+def noise_beside(evidence: LinearEvidence, wander: Wander) -> tuple[NoiseTerm, ...]:
+    """Learn the noise of a recording beside the function in its model.
+
+    Parameters
+    ----------
+    wander : Wander
+        In white noise.
+    """
+    information = Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight)
+    return learn(information, wander.cut)

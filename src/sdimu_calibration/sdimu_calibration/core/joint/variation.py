@@ -21,6 +21,7 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import white_power_on
 from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.probability import chi2_tail, normal_tail
 from sdimu_calibration.core.results import SetTrend
 
@@ -63,7 +64,7 @@ class _Scores:
 
 def variation(fit: SetFit) -> Variation:
     """Test every coefficient in every recording."""
-    shared = [n for n in fit.names if not split_tag(n)[1]]
+    shared = [n for n in fit.names if not (split_tag(n)[1] or is_weight(n))]
     scores = _scores(fit, len(shared))
     own = np.diagonal(scores.gram, axis1=1, axis2=2).T
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -274,8 +274,11 @@ class Posterior(Generic[E]):
 
     def of_noise(self, triad: str, kinds: Collection[str] = KINDS) -> float:
         """Probability that a triad has noise of one of some kinds."""
-        have = [any(t.triad == triad and t.kind in kinds for t in noise.terms) for noise, _ in self.noises]
-        return min(1.0, float(sum(p for (_, p), one in zip(self.noises, have, strict=True) if one)))
+        return self.of_any_noise(lambda noise: any(t.triad == triad and t.kind in kinds for t in noise.terms))
+
+    def of_any_noise(self, holds: Callable[[NoiseModel], bool]) -> float:
+        """Probability of the noises of which something holds (1)."""
+        return min(1.0, float(sum(p for noise, p in self.noises if holds(noise))))
 
     @cached_property
     def nothing(self) -> float:

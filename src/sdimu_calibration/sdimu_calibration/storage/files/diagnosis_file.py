@@ -34,6 +34,8 @@ from sdimu_calibration.storage.files.result_model import Array, Line, Number, Re
 from sdimu_calibration.storage.files.standing_file import KnownEntry
 
 if TYPE_CHECKING:
+    from sdimu_calibration.core.joint.recurrence import Recurrence
+
     # A diagnosis of one recording does not load what joins several.
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
@@ -311,6 +313,7 @@ class SetDiagnosisFile(ResultModel):
     sentence: Said = ""
     threshold: Number = np.nan
     probabilities: Row = None
+    function: Number = 0.0
     findings: Rows = ()
     refused: tuple[Line, ...] = ()
     held_out_before: Number = np.nan
@@ -322,6 +325,10 @@ class SetDiagnosisFile(ResultModel):
     recurrence: Row = None
 
 
+def _recurrence(found: Recurrence) -> dict[str, Any]:
+    return {"answer": list(found.answer), "apart": found.apart, **asdict(found)}
+
+
 def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
     """Write set.json: verdict, sentence, findings (SI), advice, what is known of the unit, and what comes back."""
     SetDiagnosisFile.model_construct(
@@ -330,6 +337,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         sentence=found.sentence,
         threshold=found.threshold,
         probabilities=odds(found.probabilities),
+        function=found.function,
         findings=[asdict(f) | {"alike": list(f.alike), "may_be": _shares(f.may_be)} for f in found.findings],
         refused=[f.label for f in found.refused],
         held_out_before=found.error_without,
@@ -339,7 +347,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         fit={"before": {"model": list(found.before.model)}},
         alone=alone(found.first.evidence),
         # None where the model leaves nothing in the stops.
-        recurrence=None if found.recurrence is None else asdict(found.recurrence),
+        recurrence=None if found.recurrence is None else _recurrence(found.recurrence),
     ).write(Path(path))
 
 
