@@ -147,6 +147,11 @@ class JointDiagnosis(Diagnosed):
         return self.found[0]
 
     @property
+    def function(self) -> float:
+        """Probability that all recordings share an unknown function of the attitude; 0 where none was looked for."""
+        return self.core.function
+
+    @property
     def unknown(self) -> tuple[UnknownFunction, ...]:
         """Function of the attitude that all recordings share and no effect explains: mean and sigma at all stops."""
         return self.core.unknown

@@ -35,7 +35,7 @@ from sdimu_calibration.core.plan_search import Question
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
-from sdimu_calibration.core.probability import chi2_tail
+from sdimu_calibration.core.probability import chi2_tail, in_percent
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -103,7 +103,7 @@ def diagnose_set(
             facts = _facts(found, again)
             tags = {f.tag for f in facts.findings}
             refused = tuple(f for f in earlier if f.tag not in tags)
-            why = _explained(again, found.with_function, [f.tag for f in refused])
+            why = _explained(again, found, [f.tag for f in refused])
     word = verdict_of_set(facts)
     why = why if found.stood else f"{why} {TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}.".strip()
     test = found.after.base.test
@@ -137,12 +137,12 @@ def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
     return SetFacts(_findings(found), after, found.after, again, told)
 
 
-def _explained(again: Recurrence, sensors: Sequence[str], labels: Sequence[str]) -> str:
-    """Say what an unknown function of some sensors explains; labels of one recording have its name behind."""
+def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> str:
+    """Say what an unknown function explains, and how likely it is; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
     too = f" It also explains {', '.join(names)}: not told." if names else ""
     of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
-    where = listing(sensors)
+    where = f"{listing(found.with_function)} ({in_percent(found.function)})"
     return f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.{too}"
 
 
