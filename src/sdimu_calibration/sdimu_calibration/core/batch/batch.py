@@ -42,7 +42,7 @@ from sdimu_calibration.core.batch.batch_rows import (
     still,
 )
 from sdimu_calibration.core.batch.chain import Link, Solution, solve
-from sdimu_calibration.core.batch.preintegration import Preintegration, preintegrate
+from sdimu_calibration.core.batch.preintegration import Preintegration, arrival, preintegrate
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
@@ -144,7 +144,7 @@ def _begin(
     rest = rest_means(prepared, where, setup.sensors, values)
     force = (rest.mean - rest.design @ coefficients)[:, 3:]
     for i in range(k - 1):
-        arrived = _travel(prepared, setup, where, point, seen, values, i).C_nb
+        arrived = arrival(prepared, _motion_after(where, i), setup, values, coefficients, point.C_nb[i])
         point.C_nb[i + 1] = levelled(arrived, force[where.block_stop == i + 1].mean(axis=0))
     return point, where
 
@@ -179,6 +179,11 @@ def _seen(prepared: PreparedData, setup: TestSetup, where: Layout, point: Linear
     return replace(seen, C_nb=C_nb, w_table=w_table, w=w, f=f, rest=prepared.rest)
 
 
+def _motion_after(where: Layout, k: int) -> slice:
+    """Cycles of the motion from stop k to the next."""
+    return slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
+
+
 def _travel(
     prepared: PreparedData,
     setup: TestSetup,
@@ -189,7 +194,7 @@ def _travel(
     k: int,
 ) -> Preintegration:
     """Integrate the motion from stop k to the next."""
-    rows = slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
+    rows = _motion_after(where, k)
     slope = error_slope(setup.sensors, seen, rows, point.coefficients)
     return preintegrate(prepared, rows, setup, values, slope, point.coefficients, point.C_nb[k])
 

@@ -17,7 +17,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
-from sdimu_calibration.core.navigation.strapdown import navigate_cycle, velocity_increment
+from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 
 
@@ -73,6 +73,42 @@ def _navigate(
     return track, moved
 
 
+def _navigated(
+    cycles: Cycles, setup: TestSetup, values: Floats, coefficients: Floats, C_nb: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Integrate corrected samples: what `_navigate` gives, and the velocity increments (n, 3) without their errors.
+
+    `values`: regressors of the cycles, shape (n, m); the rest as for `preintegrate`.
+    """
+    latitude, height = setup.site.latitude_rad, setup.site.height_m
+    gravity_excess = setup.gravity - float(earth.normal_gravity(latitude, height))
+    c = cycles
+    error = setup.sensors.errors(values, coefficients) * c.dt[:, None]
+    alpha, upsilon = c.alpha - error[:, :3], c.upsilon - error[:, 3:]
+    track, moved = _navigate(C_nb.copy(), c.dt, alpha, upsilon, c.coning, c.sculling, latitude, height, gravity_excess)
+    return track, moved, upsilon
+
+
+def arrival(
+    prepared: PreparedData, rows: slice, setup: TestSetup, values: Floats, coefficients: Floats, C_nb: Floats
+) -> Floats:
+    """Attitude at the end of one motion, b to n, shape (3, 3): that of `preintegrate`, without linear responses.
+
+    Parameters
+    ----------
+    rows : slice
+        Cycles of the motion.
+    values : ndarray, shape (n, m)
+        Regressors of all cycles.
+    coefficients : ndarray, shape (p,)
+        Coefficients for which the samples are corrected.
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start.
+    """
+    track, _, _ = _navigated(prepared.cycles[rows], setup, values[rows], coefficients, C_nb)
+    return np.asarray(track[-1])
+
+
 def preintegrate(
     prepared: PreparedData,
     rows: slice,
@@ -104,13 +140,10 @@ def preintegrate(
         Attitude at the start.
     """
     model, latitude, height = setup.sensors, setup.site.latitude_rad, setup.site.height_m
-    gravity_excess = setup.gravity - float(earth.normal_gravity(latitude, height))
     densities = setup.imu.gyro_white_noise**2, setup.imu.accel_white_noise**2
     c = prepared.cycles[rows]
     own = values[rows]
-    error = model.errors(own, coefficients) * c.dt[:, None]
-    alpha, upsilon = c.alpha - error[:, :3], c.upsilon - error[:, 3:]
-    track, moved = _navigate(C_nb.copy(), c.dt, alpha, upsilon, c.coning, c.sculling, latitude, height, gravity_excess)
+    track, moved, upsilon = _navigated(c, setup, own, coefficients, C_nb)
     left = np.cumsum(c.dt[::-1])[::-1] - 0.5 * c.dt
     still = _not_turning(0.5 * (track[:-1] + track[1:]), left, latitude)
     dv = np.einsum("kij,kj->ki", still, upsilon)
