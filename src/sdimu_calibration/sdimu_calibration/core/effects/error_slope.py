@@ -37,6 +37,9 @@ def error_slope(model: ImuModel, seen: Motion, rows: slice | Ints, coefficients:
         force (m/s^2), in b.
     """
     at = _at(seen, rows)
+    if not coefficients.any():
+        # Errors are columns times coefficients: regressors at seven steps would give the same zeros.
+        return np.zeros((len(at.t), 6, 6))
     before = model.errors(model.regressors(at), coefficients)
     slope = np.empty((len(before), 6, 6))
     moving = np.where(at.rest, 0.0, 1.0)[:, None]
