@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,6 +27,9 @@ from sdimu_calibration.storage.files.result_file import write_result
 
 START_NS = 1_700_000_000_000_000_000
 INTERVAL_NS = 10_000_000
+
+# As the shell does (cli/start.py): half a million objects of modules and tests are none of the garbage that is sought.
+gc.set_threshold(50_000, 20, 50)
 
 # Every worker of a parallel run has DDS traffic of its own, on this machine only; a run beside another one begins at
 # another domain. Domains 215 to 232 have ports beyond those that Linux gives to clients, and `sdimu run` takes none of

@@ -21,11 +21,16 @@ APART = (
 )
 """Files of long tests that share nothing: their tests may go to any worker."""
 
+_DIAGNOSES = "test/sdimu_calibration/core/diagnosis/test_diagnose.py"
 TOGETHER = {
     "test/ros/test_layouts.py": "test/ros/test_whole_run.py",
     "test/ros/test_transforms.py": "test/ros/test_whole_run.py",
+    "test/sdimu_calibration/core/diagnosis/test_assumed.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/diagnosis/test_coefficient_shifts.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/diagnosis/test_grades.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/posterior/test_coefficients.py": _DIAGNOSES,
 }
-"""Files that go to the worker of another one, with which they share a whole run over DDS."""
+"""Files that go to the worker of another one, with which they share a whole run over DDS, or diagnoses of `bench`."""
 
 DOMAINS_A_RUN = 4
 """Number of ROS domains that a parallel run of tests takes, from its first one; with more workers some share."""
@@ -44,6 +49,10 @@ LONGEST = (
     "test/sdimu_calibration/core/estimation/test_every_estimator.py",
     "test/sdimu_calibration/cli/test_terminal.py",
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py",
+    "test/sdimu_calibration/core/joint/test_shared_scatter.py",
+    "test/sdimu_calibration/storage/test_matlab_objects.py",
+    "test/sdimu_calibration/core/test_live_end.py",
+    "test/sdimu_calibration/core/posterior/test_noise_models.py",
     "test/recovery/test_faults.py",
     "test/recovery/test_grades.py",
     "test/mutation/test_mutations.py",
@@ -78,9 +87,13 @@ LONGEST = (
     "test/sdimu_calibration/core/noise/test_quantisation.py",
     "test/sdimu_calibration/cli/test_diagnose.py",
     "test/sdimu_calibration/core/posterior/test_combinations.py",
-    "test/sdimu_calibration/core/diagnosis/test_coefficient_shifts.py",
+    "test/sdimu_calibration/core/diagnosis/test_averaged.py",
+    "test/sdimu_calibration/core/posterior/test_open_noise.py",
+    "test/sdimu_calibration/core/test_live_noise.py",
+    "test/sdimu_calibration/api/test_advice_in_python.py",
+    "test/sdimu_calibration/core/joint/test_set_board.py",
 )
-"""Files that keep a processor busy for 15 s and more, about in that order; the rest follow by their number of tests."""
+"""Files that keep a processor busy for 5 s and more, the longest first; the rest follow by their number of tests."""
 
 
 def scope_of(name: str) -> str:
