@@ -7,12 +7,14 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
+from sdimu_calibration.core.batch.batch import _begin
 from sdimu_calibration.core.batch.preintegration import preintegrate
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.plan import Plan
+from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
 from sdimu_calibration.core.specification import ImuSpecification
@@ -177,3 +179,33 @@ def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
         np.testing.assert_allclose(
             here.by_coefficient[:, j] / scale, numerical / scale, atol=tolerance, err_msg=setup.sensors.names[j]
         )
+
+
+def test_it_begins_at_the_attitude_of_every_stop(imu, model, site):
+    mount = np.array([0.7, -1.1, 1.9])
+    nominal = prepare(SHORT, site, imu, model, mount, None)
+    nothing = np.zeros(len(nominal.setup.sensors.prior))
+    point, _ = _begin(nominal.prepared, nominal.setup, nominal.start.C_nb, nothing)
+    C_nb = rotation_matrix(mount)
+    table = np.eye(3)
+    for turn, found in zip((None, *SHORT.turns), point.C_nb, strict=True):
+        if turn is not None:
+            table = table @ rotation_matrix(turn.angle_rad * np.eye(3)["XYZ".index(turn.axis)])
+        # A perfect IMU: what is left is the second order of the angle of a sample.
+        assert np.linalg.norm(rotation_vector(found @ (table @ C_nb).T)) < 1e-4
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-3, 2.0])
+def test_the_slope_of_sensor_errors_is_in_proportion_to_the_coefficients(imu, model, site, share):
+    recording, _ = generate(Scenario(SHORT, imu, site, seed=6, rate_hz=20.0))
+    setup = set_up(site, imu, model)
+    prepared = reduce(recording, setup)
+    coefficients = np.array(list(PERCENTS.prior.values())).repeat([3, 3, 6, 6, 3, 3, 6])
+    moving = np.zeros(len(prepared.cycles), dtype=bool)
+    C_nb, nothing = rotation_matrix(np.array([0.7, -1.1, 1.9])), Correction(setup.sensors, 0.0 * coefficients)
+    seen = motion(prepared.cycles, moving, nothing, C_nb, setup.around(None), True)
+    whole = error_slope(setup.sensors, seen, slice(200, 350), coefficients)
+    assert np.abs(whole).max() > 0.01
+    part = error_slope(setup.sensors, seen, slice(200, 350), share * coefficients)
+    # Rounding of errors of percents over the steps of the derivatives.
+    np.testing.assert_allclose(part, share * whole, atol=1e-6)
