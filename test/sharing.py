@@ -73,7 +73,7 @@ LONGEST = (
     "test/sdimu_calibration/core/joint/test_static_sets.py",
     "test/sdimu_calibration/core/joint/test_changed.py",
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py",
-    "test/sdimu_calibration/core/evidence/test_learned_noise.py",
+    "test/sdimu_calibration/core/posterior/test_likely_noise.py",
     "test/sdimu_study/test_hand_run.py",
     "test/sdimu_calibration/core/joint/test_set_fit.py",
     "test/sdimu_calibration/cli/test_exit_status.py",

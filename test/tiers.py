@@ -181,14 +181,14 @@ LONG = {
         "test_a_run_by_hand_takes_the_gravity_of_its_site_with_its_sigma",
         "test_coefficients_are_honest_at_a_site_that_is_off_by_what_it_states[second-order]",
     ),
-    "test/sdimu_calibration/core/evidence/test_learned_noise.py": (
+    "test/sdimu_calibration/core/posterior/test_likely_noise.py": (
         "test_the_size_of_a_term_is_inside_its_interval[flicker-3.0]",
         "test_the_size_of_a_term_is_inside_its_interval[markov-3.0]",
         "test_the_size_of_a_term_is_inside_its_interval[random_walk-0.2]",
         "test_the_size_of_a_term_is_inside_its_interval[shift-3.0]",
         "test_the_size_of_a_term_is_inside_its_interval[stop-3.0]",
         "test_the_size_of_a_term_is_inside_its_interval[turn-3.0]",
-        "test_white_noise_has_no_memory",
+        "test_white_noise_is_likeliest_where_there_is_no_other",
     ),
     "test/sdimu_calibration/core/fleet/test_datasheet.py": (
         "test_repeatability_is_in_its_interval_as_often_as_stated[8]",
@@ -365,7 +365,7 @@ VARIANTS = {
     "test/sdimu_calibration/core/estimation/test_stated_priors.py": (
         "test_a_stated_prior_conditions_the_fit_of_the_other_coefficients[gyro_scale_y-second-order-0.0]",
     ),
-    "test/sdimu_calibration/core/evidence/test_learned_noise.py": (
+    "test/sdimu_calibration/core/posterior/test_likely_noise.py": (
         "test_noise_far_above_white_noise_keeps_its_name[random_walk]",
     ),
     "test/sdimu_calibration/core/joint/test_changed.py": (

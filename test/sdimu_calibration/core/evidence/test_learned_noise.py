@@ -1,4 +1,4 @@
-"""Noise with a memory is found with its size where it is, and nowhere else."""
+"""Kernels of noise with a memory are covariances of means, and its likelihood is that of the whole covariance."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.effects.effect import Timetable
-from sdimu_calibration.core.evidence import learned_noise
 from sdimu_calibration.core.evidence.conditions import Conditions
 from sdimu_calibration.core.evidence.in_stops import InStops
-from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation, learn, likelihood
+from sdimu_calibration.core.evidence.learned_noise import InModes, NoiseInformation
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.evidence.noise_root import columns_of, root_of
 from sdimu_calibration.core.evidence.wander import Wander
@@ -19,7 +18,7 @@ from sdimu_calibration.core.noise_term import ATTITUDE, FOLLOWS, KINDS, MARKOV, 
 
 STOPS = 12
 WANDERING = [k for k in KINDS if k not in FOLLOWS]
-"""Kinds that `learn` tries; an error that follows something is weighed by the posterior alone."""
+"""Kinds of means over time; an error that follows something is a function of other than time."""
 
 
 @pytest.fixture(scope="module")
@@ -28,19 +27,6 @@ def cut():
     stops = tuple((k, 160.0 * k, 160.0 * k + 120.0) for k in range(STOPS))
     turns = tuple((k, 160.0 * k + 120.0, 160.0 * (k + 1)) for k in range(STOPS - 1))
     return stretches(Timetable(160.0 * STOPS - 40.0, stops, turns))
-
-
-def drawn(cut, terms, seed):
-    """Information of an ideal sensor that measures each stretch with a white error of one, wandering by `terms`."""
-    rng = np.random.default_rng(seed)
-    e = rng.standard_normal(6 * len(cut))
-    for term in terms:
-        # Of the whole kernel, not of the modes that the program keeps.
-        variance, vectors = np.linalg.eigh(kernel(term.kind, term.tau, cut))
-        draws = np.sqrt(np.maximum(variance, 0.0))[:, None] * rng.standard_normal((len(cut), 3))
-        first = 3 * TRIADS.index(term.triad)
-        e.reshape(-1, 6)[:, first : first + 3] += term.size * vectors @ draws
-    return NoiseInformation(np.eye(6 * len(cut)), e, 0.0)
 
 
 def test_stretches_cover_dwells_and_turns(cut):
@@ -121,64 +107,6 @@ def test_the_modes_of_a_term_make_its_whole_kernel(cut, kind):
     np.testing.assert_allclose(root @ root.T, kernel(kind, 100.0 if kind == MARKOV else 0.0, cut), atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["random_walk", "flicker"])
-def test_noise_far_above_white_noise_keeps_its_name(cut, kind):
-    """A wander of many modes is not told as one time constant, however large it is."""
-    for seed in range(1, 11):
-        found = learn(drawn(cut, [NoiseTerm("gyro", kind, 0.0, 10.0)], seed), cut)
-        of_kind = [t for t in found if t.kind == kind or kind in t.alike]
-        assert of_kind, (seed, found)
-        assert 7.0 < of_kind[0].size < 14.0
-
-
-@pytest.mark.parametrize(("kind", "size"), [(k, 0.2 if k == "random_walk" else 3.0) for k in WANDERING])
-def test_the_size_of_a_term_is_inside_its_interval(cut, kind, size):
-    true = NoiseTerm("gyro", kind, 100.0 if kind == MARKOV else 0.0, size)
-    inside = named = 0
-    for seed in range(1, 21):
-        information = drawn(cut, [true], seed)
-        found = learn(information, cut)
-        assert all(t.triad == "gyro" for t in found)
-        own = [t for t in found if t.kind == kind]
-        named += bool(own)
-        # Of a family that looks alike, the true one is never much worse than the one that was taken.
-        assert likelihood(information, cut, found) > likelihood(information, cut, [true]) - 3.0
-        inside += any(t.low <= size <= t.high for t in own)
-    assert named >= 12
-    assert inside >= 0.75 * named
-
-
-def test_noise_far_above_white_noise_has_an_interval(cut):
-    """Known better than the grid of sizes is wide: the interval is narrow and holds the truth."""
-    many = [NoiseTerm(triad, "shift", 0.0, 3e2) for triad in ("gyro", "accel")]
-    found = [t for t in learn(drawn(cut, many, 5), cut) if t.kind == "shift"]
-    assert {t.triad for t in found} == {"gyro", "accel"}
-    for term in found:
-        assert 0.0 < term.low <= term.size <= term.high < 2.0 * term.low
-        assert term.low < 3e2 < term.high
-
-
-def test_white_noise_has_no_memory(cut):
-    false = sum(bool(learn(drawn(cut, [], seed), cut)) for seed in range(100, 200))
-    assert false <= 3
-
-
-@pytest.mark.timeout(60)
-def test_learning_ends_with_the_likeliest_where_terms_come_and_go(cut, monkeypatch):
-    of_gyro, of_accel = (replace(NoiseTerm(triad, "flicker"), size=1.0, gain=100.0) for triad in TRIADS)
-    after = {"gyro": of_accel, "accel": of_gyro}
-    information = drawn(cut, [NoiseTerm("accel", "flicker", size=1.0)], 1)
-    monkeypatch.setattr(learned_noise, "_best_sizes", lambda *_: [of_gyro, of_accel])
-    monkeypatch.setattr(learned_noise, "refined", lambda _i, _c, terms: (after[terms[0].triad] if terms else of_gyro,))
-    assert learn(information, cut) == (of_accel,)
-
-
-def test_noise_of_one_triad_is_not_told_of_the_other(cut):
-    true = [NoiseTerm("accel", "random_walk", size=0.3)]
-    for seed in range(1, 11):
-        assert {t.triad for t in learn(drawn(cut, true, seed), cut)} == {"accel"}
-
-
 def test_the_mean_of_the_noise_counts_the_modes_that_no_measurement_sees(cut):
     """An accelerometer that is seen in one stretch of four wanders in the others, too."""
     U = np.eye(6 * len(cut))
@@ -212,7 +140,7 @@ def of_some_sensors(cut):
     )
     rng = np.random.default_rng(5)
     W = rng.standard_normal((400, 6 * len(cut)))
-    information = NoiseInformation(W.T @ W / 400.0, W.T @ rng.standard_normal(400) / 20.0, 0.0)
+    information = NoiseInformation(W.T @ W / 400.0, W.T @ rng.standard_normal(400) / 20.0)
     return terms, information
 
 
@@ -262,4 +190,4 @@ def test_what_noise_of_some_sensors_adds_is_that_of_the_whole_covariance(cut):
 
     assert gain[near] == pytest.approx(dense(with_it) - dense(others), abs=1e-4)
     assert given.gain == pytest.approx(dense(others), abs=1e-4)
-    assert likelihood(information, cut, with_it) == pytest.approx(dense(with_it), abs=1e-4)
+    assert information.gain(with_it, cut) == pytest.approx(dense(with_it), abs=1e-4)

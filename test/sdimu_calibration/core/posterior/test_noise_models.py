@@ -59,7 +59,7 @@ def drawn(rng, cut, usual):
             root = np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(len(cut)))
             error[:, axes] = size * root @ rng.standard_normal((len(cut), 3))
     d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(len(J))
-    return NoiseInformation(np.diag(J), d, 0.0), there
+    return NoiseInformation(np.diag(J), d), there
 
 
 def told(information, cut, usual):
@@ -101,7 +101,7 @@ def test_what_is_told_of_a_triad_does_not_hang_on_the_noise_of_the_other(cut, us
         for place, triad in enumerate(TRIADS):
             d = information.d.reshape(-1, 6).copy()
             d[:, 3 - 3 * place : 6 - 3 * place] = 0.0
-            alone = told(NoiseInformation(information.J, d.ravel(), 0.0), cut, usual)
+            alone = told(NoiseInformation(information.J, d.ravel()), cut, usual)
             for term in TRIED:
                 if term.triad == triad:
                     assert both[triad, term.kind] == pytest.approx(alone[triad, term.kind], abs=0.04)
@@ -121,7 +121,7 @@ def seen_through_gyros(rng, cut, usual, strong=FLICKER):
         y = H @ np.concatenate(error) + rng.standard_normal(2 * n)
         d[:, :, axis] = (H.T @ y).reshape(2, n).T
         J[:, :, axis, :, :, axis] = (H.T @ H).reshape(2, n, 2, n).transpose(1, 0, 3, 2)
-    return NoiseInformation(J.reshape(6 * n, 6 * n), d.ravel(), 0.0)
+    return NoiseInformation(J.reshape(6 * n, 6 * n), d.ravel())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -181,7 +181,7 @@ def two_in_each(rng, cut, usual):
             root = np.linalg.cholesky(kernel(str(kind), 0.0, cut) + 1e-12 * np.eye(n))
             error[:, axes] += size * root @ rng.standard_normal((n, 3))
     d = J * error + np.sqrt(J) * rng.standard_normal(J.shape)
-    return NoiseInformation(np.diag(J.ravel()), d.ravel(), 0.0)
+    return NoiseInformation(np.diag(J.ravel()), d.ravel())
 
 
 def test_no_pair_of_kinds_in_a_triad_is_far_better_than_what_is_found(cut, usual):
@@ -221,7 +221,7 @@ def test_the_likeliest_noise_without_terms_like_effects_is_found_where_all_other
             root = np.linalg.cholesky(kernel(kind, 0.0, cut) + 1e-12 * np.eye(n))
             error[:, axes] += share * size * root @ rng.standard_normal((n, 3))
     J = J.ravel()
-    information = NoiseInformation(np.diag(J), J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n), 0.0)
+    information = NoiseInformation(np.diag(J), J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n))
     found = explored(information, cut, usual, TRIED)
     assert not found[0][1].wanders_alone
     score, noise = found[-1]
@@ -274,7 +274,7 @@ def ramps(rng, cut, usual):
     error[:, :3] = size * root @ rng.standard_normal((n, 3))
     error[:, 0] += np.linspace(-6.0, 6.0, n) * size
     d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n)
-    return NoiseInformation(J * np.eye(6 * n), d, 0.0)
+    return NoiseInformation(J * np.eye(6 * n), d)
 
 
 def test_noise_without_the_kind_that_stands_for_a_ramp_is_found_far_behind(cut, usual):
@@ -299,7 +299,7 @@ def shifted_once(rng, cut, size):
     error[:, :3] = size * root @ rng.standard_normal((n, 3))
     error[n // 2 :, 0] += 3.0 * size
     d = J * error.ravel() + np.sqrt(J) * rng.standard_normal(6 * n)
-    return NoiseInformation(J * np.eye(6 * n), d, 0.0)
+    return NoiseInformation(J * np.eye(6 * n), d)
 
 
 def test_noise_with_other_drawn_terms_in_the_place_of_the_likeliests_is_found_far_behind_it(cut, usual):

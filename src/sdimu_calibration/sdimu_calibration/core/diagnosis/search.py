@@ -18,7 +18,7 @@ from sdimu_calibration.core.diagnosis.scan import Scan
 from sdimu_calibration.core.diagnosis.step import Step, step_of
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import with_alike, with_intervals
+from sdimu_calibration.core.evidence.learned_noise import with_intervals
 from sdimu_calibration.core.evidence.linear import E
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import FOLLOWS, KINDS, TRIADS, NoiseTerm
@@ -172,8 +172,7 @@ def _stated(found: Search[E]) -> tuple[NoiseTerm, ...]:
     if not found.noise or window is None or window.board.joint is None or window.board.wander is None:
         return found.noise
     information = window.board.joint.on_wander(*window.board.parameters(window.told.members))
-    cut = window.board.wander.cut
-    return with_alike(information, cut, with_intervals(information, cut, found.noise))
+    return with_intervals(information, window.board.wander.cut, found.noise)
 
 
 def told_effects(found: Posterior[E]) -> list[int]:

@@ -21,11 +21,11 @@ from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
-from sdimu_calibration.core.evidence.stretch_length import wander_of
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Note, Topic
+from sdimu_calibration.core.posterior.likely_noise import wander_of
 from sdimu_calibration.core.recording import DataFault, Recording
 from sdimu_calibration.core.results import NOT_TRUSTED, START_TEMPERATURE, History, Rest, no_history
 from sdimu_calibration.core.site_reference import Reference

@@ -18,10 +18,11 @@ from sdimu_calibration.core.evidence.consistency import stop_means
 from sdimu_calibration.core.evidence.held_out import predict
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import learn, likelihood, with_alike
+from sdimu_calibration.core.evidence.learned_noise import with_intervals
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.wander import Modes, Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.likely_noise import likely_noise
 from sdimu_calibration.core.probability import chi2_tail
 
 F = TypeVar("F", bound=Fit)
@@ -66,8 +67,10 @@ def noise_of(fit: Fit) -> FoundNoise:
     wander = fit.wander
     evidence = fit.bare.in_inner(wander.inner)
     information = Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight)
-    terms = learn(information, wander.cut) if wander.learned is None else wander.learned
-    return FoundNoise(with_alike(information, wander.cut, terms), evidence)
+    cut, terms = wander.cut, wander.learned
+    if terms is None:
+        terms = likely_noise(information, cut, evidence.imu)
+    return FoundNoise(with_intervals(information, cut, terms), evidence)
 
 
 def suspected(fit: NavigationFit) -> bool:
@@ -102,7 +105,7 @@ def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[N
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
     rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms if held_out else float("nan")
     information = Joint.of(bare, wander).on_wander(evidence.model, evidence.weight)
-    gain = likelihood(information, wander.cut, terms) - information.fitted
+    gain = information.gain(terms, wander.cut)
     estimate = NoiseEstimate(
         tuple(terms), deviation, covariance, gain, squared / max(1, len(residual) - len(deviation)), rms
     )

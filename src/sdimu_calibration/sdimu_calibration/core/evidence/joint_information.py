@@ -77,7 +77,7 @@ class Joint:
         B, d = self.across[known], own.d[known]
         X = solved(own.J[np.ix_(known, known)] + np.diag(weight), np.column_stack([B, d]))
         J = self.wander.U.square - B.T @ X[:, :-1]
-        return NoiseInformation(0.5 * (J + J.T), self.pull - B.T @ X[:, -1], 0.5 * float(d @ X[:, -1]))
+        return NoiseInformation(0.5 * (J + J.T), self.pull - B.T @ X[:, -1])
 
     def in_noise(self, terms: Sequence[NoiseTerm]) -> Information:
         """Information on the columns of the evidence in noise of these terms."""

@@ -1,4 +1,4 @@
-"""Noise with a memory, learned from a linear model of a recording by maximum likelihood.
+"""Likelihood of noise with a memory in a linear model of a recording.
 
 Every sensor gets an unknown mean error in every stretch of the test; their signatures U stand in the whitened
 residuals like those of any parameter. A noise term says how these errors correlate (`noise_kernels`), so that
@@ -37,20 +37,14 @@ from sdimu_calibration.core.noise_term import (
     STOP,
     TRIADS,
     TURN,
-    Identity,
     NoiseTerm,
 )
 from sdimu_calibration.core.side_by_side import side_by_side
 
-LEAST_GAIN = 5.0
-"""Least gain of the log-likelihood (1) by a noise term: of 16 terms tried on white noise, one in two hundred tests
-reaches it."""
-_TUNING = tuple(1.25**k for k in range(-4, 5))
-"""Ratios of time constants to the one that was found: to its neighbours, and a fifth beyond."""
+_TIMES = tuple(1.25**k for k in range(-4, 5) if k)
+"""Ratios of time constants near one that was found to it: to its neighbours, and a fifth beyond."""
 MOST_TERMS = 2
 """Number of noise terms of a triad at most: a test of an hour tells no more apart."""
-_SWEEPS = 3
-"""Number of times that all sizes are optimised in turn: a fourth changes them by less than a tenth of their sigma."""
 _GRID = np.logspace(-3.0, 8.0, 111)
 """Ratios of the variance to that at which the best seen mode is as large as its noise: no size lies outside."""
 _FINE = np.logspace(-0.12, 0.12, 49)
@@ -71,9 +65,6 @@ class NoiseInformation:
     """Shape (6 n, 6 n)."""
     d: Floats
     """Shape (6 n,)."""
-    fitted: float
-    """Log-likelihood that the known parameters add, with white noise alone."""
-
     _beside: dict[str, tuple[Hashable, InTriad]] = field(default_factory=dict, init=False, repr=False, compare=False)
     """Of each triad, what was asked for last: beside which noise of the other triad, and the answer."""
 
@@ -103,6 +94,8 @@ class NoiseInformation:
 
     def gain(self, terms: Sequence[NoiseTerm], cut: Stretches) -> float:
         """Log-likelihood (1) of noise terms over that of white noise."""
+        if not terms:
+            return 0.0
         M, y, _ = folded(self.J, self.d, terms, cut)
         return taken(M, y, np.zeros((0, len(y)))).gain
 
@@ -147,85 +140,25 @@ class InTriad:
         return InTriad(self.J - taken.J, self.d - taken.d, self.gain + taken.gain)
 
 
-def learn(information: NoiseInformation, cut: Stretches, start: Sequence[NoiseTerm] = ()) -> tuple[NoiseTerm, ...]:
-    """Find the noise terms that the data ask for, with their sizes; none where white noise will do.
+def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
+    """Put 95 % intervals to the sizes of terms, and say of each which kinds in its place are as likely.
 
-    Parameters
-    ----------
-    start : sequence of NoiseTerm
-        Terms to begin with.
+    The interval of a Markov term holds the sizes at all likely time constants near its own. Kinds are as likely within
+    odds of 20 to 1. The sizes stay.
     """
-    terms = refined(information, cut, start)
-    tried, seen = kinds(cut), dict[frozenset[Identity], tuple[NoiseTerm, ...]]()
-    while True:
-        which = frozenset(t.identity for t in terms)
-        if which in seen:
-            # Terms come and go: about a fit that is far off, sizes are not what they are alone.
-            likeliest = max(seen.values(), key=lambda some: likelihood(information, cut, some))
-            return _tuned(information, cut, likeliest)
-        seen[which] = terms
-        options = [
-            size
-            for triad in TRIADS
-            for size in _best_sizes(
-                information.of_triad(triad, terms, cut), cut, [t for t in tried if t.triad == triad and _room(terms, t)]
-            )
-        ]
-        best = max(options, key=lambda t: t.gain, default=None)
-        if best is None or best.gain < LEAST_GAIN:
-            return _tuned(information, cut, terms)
-        terms = refined(information, cut, (*terms, best))
-
-
-def _tuned(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
-    """Fit the time constants of Markov terms between those that were tried; the intervals of the sizes take them in."""
-    out = list(terms)
-    for place, term in enumerate(terms):
-        if term.tau:
-            out[place] = _over_times(information, cut, [t for t in out if t is not term], term)
-    return tuple(out)
-
-
-def _over_times(
-    information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm
-) -> NoiseTerm:
-    """Best size of a Markov term, of the time constants near its own; the interval holds those of all likely ones."""
-    given = information.of_triad(term.triad, others, cut)
-    near = _best_sizes(given, cut, [replace(term, tau=float(f"{term.tau * k:.3g}")) for k in _TUNING])
-    best = max(near, key=lambda t: t.gain)
-    likely = [t for t in near if t.gain > best.gain - _INTERVAL]
-    return replace(best, low=min(t.low for t in likely), high=max(t.high for t in likely))
-
-
-def with_alike(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
-    """Say of each term which kinds in its place are as likely, within odds of 20 to 1."""
     out = []
     for term in terms:
         given = information.of_triad(term.triad, [t for t in terms if t is not term], cut)
-        tried = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
-        others = _best_sizes(given, cut, tried)
-        near = {t.kind for t in others if t.gain > term.gain - INDISTINGUISHABLE}
-        out.append(replace(term, alike=tuple(kind for kind in KINDS if kind in near)))
+        taus = [float(f"{term.tau * k:.3g}") for k in _TIMES if term.tau]
+        others = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
+        sized = _best_sizes(given, cut, [term, *(replace(term, tau=tau) for tau in taus), *others])
+        gain, near = sized[0].gain, sized[: 1 + len(taus)]
+        likely = [t for t in near if t.gain > max(t.gain for t in near) - _INTERVAL]
+        low, high = min(term.size, *(t.low for t in likely)), max(term.size, *(t.high for t in likely))
+        alike = {t.kind for t in sized[len(near) :] if t.gain > gain - INDISTINGUISHABLE}
+        in_order = tuple(kind for kind in KINDS if kind in alike)
+        out.append(replace(term, low=low, high=high, gain=gain, alike=in_order))
     return tuple(out)
-
-
-def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
-    """Put 95 % intervals to the sizes of terms, and what each adds to the log-likelihood; the sizes stay.
-
-    That of a Markov term holds the sizes at all likely time constants near its own.
-    """
-    out = []
-    for term in terms:
-        others = [t for t in terms if t is not term]
-        best = _alone(information, cut, others, term)
-        ends = _over_times(information, cut, others, term) if term.tau else best
-        out.append(replace(term, low=min(ends.low, term.size), high=max(ends.high, term.size), gain=best.gain))
-    return tuple(out)
-
-
-def _room(terms: Sequence[NoiseTerm], term: NoiseTerm) -> bool:
-    of_triad = [t for t in terms if t.triad == term.triad]
-    return len(of_triad) < MOST_TERMS and term.kind not in {t.kind for t in of_triad}
 
 
 def kinds(cut: Stretches) -> list[NoiseTerm]:
@@ -239,31 +172,6 @@ def kinds(cut: Stretches) -> list[NoiseTerm]:
         out += [NoiseTerm(triad, kind) for kind in (RANDOM_WALK, FLICKER, STOP, TURN, SHIFT)]
         out += [NoiseTerm(triad, MARKOV, tau) for tau in taus]
     return out
-
-
-def refined(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> tuple[NoiseTerm, ...]:
-    """Optimise the sizes of all terms together; drop those that the data do not ask for."""
-    kept = list(terms)
-    for _ in range(_SWEEPS if len(kept) > 1 else 1):
-        for place in range(len(kept)):
-            others = [t for k, t in enumerate(kept) if k != place]
-            kept[place] = _alone(information, cut, others, kept[place])
-    weakest = min(kept, key=lambda t: t.gain, default=None)
-    if weakest is None or weakest.gain >= LEAST_GAIN:
-        return tuple(kept)
-    return refined(information, cut, [t for t in kept if t is not weakest])
-
-
-def likelihood(information: NoiseInformation, cut: Stretches, terms: Sequence[NoiseTerm]) -> float:
-    """Log-likelihood of the known parameters and the noise terms, against no parameters and white noise."""
-    if not terms:
-        return information.fitted
-    return information.fitted + information.gain(terms, cut)
-
-
-def _alone(information: NoiseInformation, cut: Stretches, others: Sequence[NoiseTerm], term: NoiseTerm) -> NoiseTerm:
-    """Best size of one term, the others standing; with its interval, and the gain over doing without it."""
-    return _best_size(information.of_triad(term.triad, others, cut), cut, term)
 
 
 def _best_sizes(given: InTriad, cut: Stretches, terms: Sequence[NoiseTerm]) -> list[NoiseTerm]:

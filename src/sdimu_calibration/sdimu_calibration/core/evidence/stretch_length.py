@@ -15,8 +15,6 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.evidence.inner_noise import inner_noise
-from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import learn
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches, kernel
 from sdimu_calibration.core.evidence.wander import Wander
@@ -28,21 +26,6 @@ as much changes a sigma by a fifth."""
 _OTHER = 2.0
 """Ratio of the variance that moves within a stretch to that in which rows are whitened (1) from which that is done
 anew: the 95 % interval of a size is as wide."""
-
-
-def wander_of(evidence: LinearEvidence) -> Wander:
-    """Work out how wandering biases show in a test, in stretches short enough for the noise that it has.
-
-    Parameters
-    ----------
-    evidence : LinearEvidence
-        In white noise, with the model's columns first.
-    """
-    wander = Wander.of(evidence)
-    if wander.moved.reshape(2, 3).mean(axis=1).max() < 1.0 + MOVES:
-        return wander
-    terms = learn(Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight), wander.cut)
-    return _halved(evidence, replace(wander, learned=terms), terms)
 
 
 def held(wander: Wander, terms: Sequence[NoiseTerm]) -> bool:
@@ -62,10 +45,21 @@ def wander_in(evidence: LinearEvidence, terms: Sequence[NoiseTerm]) -> Wander:
     evidence : LinearEvidence
         In white noise.
     """
-    return _halved(evidence, Wander.of(evidence), terms)
+    return halved(evidence, Wander.of(evidence), terms)
 
 
-def _halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
+def halved(evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm]) -> Wander:
+    """Halve stretches in which noise moves too much, and whiten rows in what moves within the halves.
+
+    Parameters
+    ----------
+    evidence : LinearEvidence
+        In white noise.
+    wander : Wander
+        Of the test, in stretches of the usual length.
+    terms : sequence of NoiseTerm
+        The noise.
+    """
     if moves_within(wander, terms) < MOVES:
         return wander
     half = Wander.of(evidence, 0.5)

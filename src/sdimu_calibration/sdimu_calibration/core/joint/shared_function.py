@@ -16,10 +16,10 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import learn
 from sdimu_calibration.core.evidence.linear import E, LinearEvidence
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.posterior.likely_noise import likely_noise
 
 _WEIGHT = " function "
 """What the name of a weight has between those of its sensor and its function."""
@@ -100,4 +100,4 @@ def noise_beside(evidence: LinearEvidence, wander: Wander) -> tuple[NoiseTerm, .
         In white noise.
     """
     information = Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight)
-    return learn(information, wander.cut)
+    return likely_noise(information, wander.cut, evidence.imu)

@@ -73,6 +73,19 @@ class _Search:
             self.seen[found.noise.kinds] = found
         return found
 
+    def climbed(self, rival: float = 0.0) -> _Found | None:
+        """Add terms to white noise while that makes it likelier; None where it stays far behind effects of `rival`."""
+        best = self.keep(_Found(NoiseModel(), 0.0))
+        for share in chain(_SHARES, repeat(1.0, MOST_TERMS * len(TRIADS))):
+            option = max(self.one_more(best), key=lambda found: found.score, default=best)
+            if not option.score > best.score + _SETTLED:
+                break
+            if option.score < share * rival - _BEHIND:
+                return None
+            several = len(option.noise.terms) > 1
+            best = max(self.settled(option.noise), option, key=lambda found: found.score) if several else option
+        return best
+
     def one_more(self, base: _Found, triads: Collection[str] = TRIADS) -> list[_Found]:
         """Add each kind of noise of some triads to a noise, at its best size, where that is seen at all."""
         terms = base.noise.terms
@@ -306,6 +319,21 @@ def _kinds(terms: Sequence[NoiseTerm]) -> frozenset[Identity]:
     return frozenset(t.identity for t in terms)
 
 
+def likeliest(
+    information: NoiseInformation, cut: Stretches, usual: Sizes, tried: Sequence[NoiseTerm] | None = None
+) -> NoiseModel:
+    """Find the likeliest noise beside no effect: terms are added one by one.
+
+    Parameters
+    ----------
+    tried : sequence of NoiseTerm, optional
+        Kinds and time constants to look for; all of them without.
+    """
+    search = _Search(information, cut, usual, tried)
+    search.climbed()
+    return search.best().noise
+
+
 def explored(
     information: NoiseInformation,
     cut: Stretches,
@@ -335,18 +363,9 @@ def explored(
         effects: it is the likeliest without them.
     """
     search = _Search(information, cut, usual, tried)
-    best = search.keep(_Found(NoiseModel(), 0.0))
-    for share in chain(_SHARES, repeat(1.0, MOST_TERMS * len(TRIADS))):
-        option = max(search.one_more(best), key=lambda found: found.score, default=best)
-        if not option.score > best.score + _SETTLED:
-            break
-        if option.score < share * rival - _BEHIND:
-            return []
-        best = (
-            option
-            if len(option.noise.terms) < 2
-            else max(search.settled(option.noise), option, key=lambda found: found.score)
-        )
+    best = search.climbed(rival)
+    if best is None:
+        return []
     if best.noise.terms and not brief:
         search.paired(best)
         best = max(best, search.best(), key=lambda found: found.score)
