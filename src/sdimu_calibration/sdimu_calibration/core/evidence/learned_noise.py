@@ -40,6 +40,7 @@ from sdimu_calibration.core.noise_term import (
     NoiseTerm,
 )
 from sdimu_calibration.core.side_by_side import side_by_side
+from sdimu_calibration.core.variances import FALL
 
 _TIMES = tuple(1.25**k for k in range(-4, 5) if k)
 """Ratios of time constants near one that was found to it: to its neighbours, and a fifth beyond."""
@@ -49,8 +50,6 @@ _GRID = np.logspace(-3.0, 8.0, 111)
 """Ratios of the variance to that at which the best seen mode is as large as its noise: no size lies outside."""
 _FINE = np.logspace(-0.12, 0.12, 49)
 """Factors about the best variance of the grid: a hundredth of the width of its likelihood."""
-_INTERVAL = 1.92
-"""Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
 _SHORTEST_TAU = 0.2
 """Ratio of the shortest time constant that is tried to a stretch: faster noise is white from stretch to stretch."""
 TAU_RATIO = 2.0
@@ -153,7 +152,7 @@ def with_intervals(information: NoiseInformation, cut: Stretches, terms: Sequenc
         others = [t for t in kinds(cut) if t.triad == term.triad and t.kind != term.kind]
         sized = _best_sizes(given, cut, [term, *(replace(term, tau=tau) for tau in taus), *others])
         gain, near = sized[0].gain, sized[: 1 + len(taus)]
-        likely = [t for t in near if t.gain > max(t.gain for t in near) - _INTERVAL]
+        likely = [t for t in near if t.gain > max(t.gain for t in near) - FALL]
         low, high = min(term.size, *(t.low for t in likely)), max(term.size, *(t.high for t in likely))
         alike = {t.kind for t in sized[len(near) :] if t.gain > gain - INDISTINGUISHABLE}
         in_order = tuple(kind for kind in KINDS if kind in alike)
@@ -188,7 +187,7 @@ def _best_size(given: InTriad, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
     gain = modes.gain(variance)
     at = int(np.argmax(gain))
     if gain[at] <= 0.0:
-        inside = np.flatnonzero(gain > -_INTERVAL)
+        inside = np.flatnonzero(gain > -FALL)
         high = float(np.sqrt(variance[inside[-1]])) if len(inside) else 0.0
         return replace(term, size=0.0, low=0.0, high=high, gain=0.0)
     fine = variance[at] * _FINE
@@ -197,8 +196,8 @@ def _best_size(given: InTriad, cut: Stretches, term: NoiseTerm) -> NoiseTerm:
     # Noise that stands far out is known better than the coarse grid is wide: both grids say how far its interval goes.
     order = np.argsort(np.concatenate([variance, fine]))
     both = np.concatenate([variance, fine])[order]
-    inside = np.flatnonzero(np.concatenate([gain, near])[order] > near[best] - _INTERVAL)
-    low = 0.0 if near[best] < _INTERVAL else float(np.sqrt(both[max(inside[0] - 1, 0)]))
+    inside = np.flatnonzero(np.concatenate([gain, near])[order] > near[best] - FALL)
+    low = 0.0 if near[best] < FALL else float(np.sqrt(both[max(inside[0] - 1, 0)]))
     high = float(np.sqrt(both[min(inside[-1] + 1, len(both) - 1)]))
     return replace(term, size=float(np.sqrt(fine[best])), low=low, high=high, gain=float(near[best]))
 

@@ -20,6 +20,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.probability import chi2_limit, chi2_tail, student_limit, student_tail
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.variances import crossing
 
 LEVEL = 0.95
 """Probability of all intervals: what data sheets and the reports here use."""
@@ -27,8 +28,6 @@ _GRID = 41
 """Number of variances that are tried at once: the likelihood is smooth in the logarithm of the variance."""
 _ZOOMS = 4
 """Number of times that the grid narrows about the best: each by a factor of 20, beyond 1e-4 of the variance."""
-_DOUBLINGS = 60
-"""Number of doublings of a variance until its upper bound is passed: one degree of freedom needs ten."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def random_effect(
     problem = _problem(values, sigmas, groups, x)
     fit, unit, dof, tau2 = problem.fit, problem.unit, problem.dof, problem.tau2
     found, none = fit(np.array([tau2])), fit(np.zeros(1))
-    low, high = (_crossing(fit, chi2_limit(p, dof)) for p in (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)))
+    low, high = (problem.crossing(chi2_limit(p, dof)) for p in (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)))
     scale = float(found.q[0]) / dof
     return RandomEffect(
         spread=unit * math.sqrt(tau2),
@@ -132,6 +131,10 @@ class _Problem(NamedTuple):
     unit: float
     dof: int
     tau2: float
+
+    def crossing(self, target: float) -> float:
+        """Find the variance at which the sum of squares is `target`; 0 where it is below at once."""
+        return crossing(lambda tau2: float(self.fit(np.array([tau2])).q[0]) - target, 1.0)
 
 
 def _problem(values: Floats, sigmas: Floats, groups: Sequence[str] | None, x: Floats | None) -> _Problem:
@@ -193,20 +196,3 @@ def best_variance(likelihood: Callable[[Floats], Floats], largest: float) -> flo
         low, high = grid[max(k - 1, 1)], grid[min(k + 1, len(grid) - 1)]
         grid = np.concatenate([[0.0], np.geomspace(low, high, _GRID)])
     return float(grid[int(np.argmax(likelihood(grid)))])
-
-
-def _crossing(fit: Callable[[Floats], _Fitted], target: float) -> float:
-    """Find the variance at which the sum of squares, which falls with it, is `target`; 0 where it is below at once."""
-    from scipy.optimize import brentq  # noqa: PLC0415 (0.2 s that a calibration does not need)
-
-    def excess(tau2: float) -> float:
-        return float(fit(np.array([tau2])).q[0]) - target
-
-    if excess(0.0) <= 0.0:
-        return 0.0
-    high = 1.0
-    for _ in range(_DOUBLINGS):
-        if excess(high) < 0.0:
-            break
-        high *= 2.0
-    return float(brentq(excess, 0.0, high, xtol=1e-14, rtol=1e-10))

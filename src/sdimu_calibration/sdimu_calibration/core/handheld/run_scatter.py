@@ -8,7 +8,7 @@ for least squares, Koch, *Parameter Estimation and Hypothesis Testing in Linear 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +16,13 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun
 from sdimu_calibration.core.units import from_si
+from sdimu_calibration.core.variances import crossing
 
 FORCE, RATE, TURN, WHOLE, PRIOR = 0, 1, 2, 3, -1
 """The kinds of equation; the scatter of the first three is learned, that of whole turns is stated, priors are whitened
 already."""
 _HEADING_STEP = 1e-3
 """Sigma of a step of a heading that nothing tells (rad): small enough to hold it, large enough to invert."""
-_BISECTIONS = 50
-"""Number of halvings: to rounding."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +167,7 @@ def learned(scatter: RunScatter, extra: Floats, left: Floats, free: Floats) -> F
         ) -> float:
             return float(np.sum(squares / (rest + own * value**2))) - target
 
-        out[which] = _root(excess, float(np.sqrt(np.mean(squares))))
+        out[which] = crossing(excess, float(np.sqrt(np.mean(squares))))
     return out
 
 
@@ -177,16 +176,3 @@ def scatter_in_words(extra: Sequence[float]) -> str:
     force, rate, turn = (extra[which] for which in (FORCE, RATE, TURN))
     share = 100.0 * turn
     return f"force {from_si(force, 'ug'):.3g} ug, rate {np.degrees(rate):.2g} deg/s, turns {share:.2g} % of the angle"
-
-
-def _root(excess: Callable[[float], float], scale: float) -> float:
-    """Smallest value >= 0 at which a falling function is no more above zero, by bisection."""
-    low, high = 0.0, scale
-    if excess(0.0) <= 0.0:
-        return 0.0
-    while excess(high) > 0.0:
-        high *= 2.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    return high

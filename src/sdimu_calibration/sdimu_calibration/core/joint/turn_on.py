@@ -14,11 +14,12 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.joint.combine import Combination, JointEstimate
 from sdimu_calibration.core.results import TurnOn
+from sdimu_calibration.core.variances import FALL, crossing
 
-_FALL = 1.92
-"""Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
 _SMALLEST, _LARGEST = 1e-3, 1e6
 """Range of the sigma over the resolution of one power-on (1): below, nothing is seen of it; no IMU is beyond."""
+_AT_BOUND = 1e-3
+"""Share (1) to which a bound is found, of its way from the top in log: no bound is known to a thousandth."""
 _GRID = 37
 """Number of sigmas of the first look at the range: four a decade, so that no top of the likelihood lies between."""
 _OPEN = 30
@@ -113,20 +114,18 @@ def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
 
 
 def _with_interval(combined: Combination, tau: Floats, k: int, scale: float) -> TurnOn:
-    from scipy.optimize import brentq  # noqa: PLC0415
-
     effect = combined.components[k].effect
     if not np.isfinite(scale):
         return TurnOn(effect, 0.0, 0.0, float("inf"), len(combined.y))
-    limit = _profile(combined, tau, k, tau[k]) - _FALL
+    limit = _profile(combined, tau, k, tau[k]) - FALL
 
     def above(x: float) -> float:
         return _profile(combined, tau, k, float(np.exp(x))) - limit
 
-    begin, end = np.log(max(tau[k], scale * _SMALLEST)), np.log(scale * _LARGEST)
-    low = 0.0
-    bottom = np.log(scale * _SMALLEST)
-    if tau[k] > 0.0 and begin > bottom and above(bottom) < 0.0:
-        low = float(np.exp(brentq(above, bottom, begin, xtol=1e-3)))
-    high = float(np.exp(brentq(above, begin, end, xtol=1e-3))) if above(end) < 0.0 else float("inf")
+    bottom, end = np.log(scale * _SMALLEST), np.log(scale * _LARGEST)
+    begin, low, high = max(np.log(tau[k]), bottom) if tau[k] > 0.0 else bottom, 0.0, float("inf")
+    if begin > bottom and above(bottom) < 0.0:
+        low = float(np.exp(begin - crossing(lambda way: above(begin - way), 1.0, _AT_BOUND)))
+    if above(end) < 0.0:
+        high = float(np.exp(begin + crossing(lambda way: above(begin + way), 1.0, _AT_BOUND)))
     return TurnOn(effect, float(tau[k]), low, high, len(combined.y))
