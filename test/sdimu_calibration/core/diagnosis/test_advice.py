@@ -108,7 +108,7 @@ def test_what_is_likely_is_tried_and_not_kept():
     assert [one.kind for one in add([sure, open_])] == [Kind.KEEP, Kind.TRY]
     kept, tried = (sentence(one) for one in add([sure, open_]))
     assert kept == "Calibrate with accel_quadratic_x in the model: --add 'accel_quadratic_x'."
-    assert tried.startswith("It is open which effect it is: record more before you keep accel_quadratic_y. ")
+    assert tried.startswith("It is open which effect it is: record more before accel_quadratic_y goes into the model. ")
     assert added(add([sure, open_])[1]) == ["accel_quadratic_x", "accel_quadratic_y"]
 
 
