@@ -32,3 +32,9 @@ def test_a_crossing_is_as_near_as_was_asked():
         return 1.0 / (1.0 + x) - 0.1
 
     assert 0.0 <= crossing(excess, 1.0, 0.1) / 9.0 - 1.0 <= 0.12
+
+
+@pytest.mark.parametrize("value", [1.0, math.nan])
+def test_a_function_that_does_not_fall_is_refused(value):
+    with pytest.raises(ArithmeticError, match="should be below zero"):
+        crossing(lambda _: value if math.isnan(value) or _ == 0.0 else 1.0, 1.0)

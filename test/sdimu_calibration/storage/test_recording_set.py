@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.joint.member import run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
+from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.note import Note, Topic, topic_of, without_advice
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
@@ -115,6 +117,28 @@ def test_other_bytes_are_another_job(bags, tmp_path):
         file.write("\n")
     changed = set_of([copy], replace(LIKE, measured_noise=True)).members[0]
     assert job_number(job_of(one, options, None)) != job_number(job_of(changed, options, None))
+
+
+def test_every_question_is_another_job(bags):
+    """Else an answer of an older question is taken from the folder of kept reports."""
+    member = set_of([bags / "run1"], LIKE).members[0]
+    options = replace(OPTIONS, model=replace(OPTIONS.model, effects=("gyro_bias", "accel_bias")))
+    job = job_of(member, options, None)
+    shared = SharedFunction(AttitudeFunctions(np.eye(3)), ("accel_x",), np.eye(3), {})
+    with_it = replace(job, function=shared)
+    asked = [
+        job,
+        replace(job, rivals=True),
+        replace(job, stretches=True),
+        replace(job, with_local=True),
+        replace(job, noise=()),
+        replace(job, scatter=np.ones(3)),
+        with_it,
+        replace(with_it, function=replace(shared, size={"accel_x": 1e-4})),
+        replace(with_it, function=replace(shared, sensors=("accel_y",))),
+        replace(with_it, function=replace(shared, functions=AttitudeFunctions(-np.eye(3)))),
+    ]
+    assert len({job_number(one) for one in asked}) == len(asked)
 
 
 def test_a_report_is_read_back(bags, tmp_path):

@@ -147,8 +147,8 @@ class JointDiagnosis(Diagnosed):
         return self.found[0]
 
     @property
-    def function(self) -> float:
-        """Probability that all recordings share an unknown function of the attitude; 0 where none was looked for."""
+    def function(self) -> float | None:
+        """Probability that all recordings share an unknown function of the attitude; None where none was looked for."""
         return self.core.function
 
     @property

@@ -12,6 +12,8 @@ FALL = 1.92
 """Fall of the log-likelihood (1) at the bounds of a 95 % interval: half of chi-square with one degree of freedom."""
 _STEPS = 200
 """Number of steps at most: a third of them are halvings, of which rounding leaves fifty to a range of ten to one."""
+_DOUBLINGS = 1100
+"""Number of doublings at most (1): a larger value is no number of a computer."""
 
 
 def crossing(excess: Callable[[float], float], scale: float, tolerance: float = 1e-12) -> float:
@@ -28,14 +30,23 @@ def crossing(excess: Callable[[float], float], scale: float, tolerance: float = 
         A value above 0 to begin with, in the unit of the values.
     tolerance : float
         Share of the value by which it may be too large (1).
+
+    Raises
+    ------
+    ArithmeticError
+        If the function does not end below zero, or is not a number.
     """
     low, above = 0.0, excess(0.0)
     if above <= 0.0:
         return 0.0
     high, below = scale, excess(scale)
-    while below > 0.0:
+    for _ in range(_DOUBLINGS):
+        if not below > 0.0:
+            break
         low, above, high = high, below, 2.0 * high
         below = excess(high)
+    if not below <= 0.0:
+        raise ArithmeticError(f"the function is {below:.3g} at {high:.3g} and should be below zero")
     stayed = 0
     for step in range(_STEPS):
         if high - low <= tolerance * high:

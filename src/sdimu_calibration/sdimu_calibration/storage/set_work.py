@@ -25,6 +25,7 @@ from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit
 from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
+from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -210,6 +211,9 @@ def job_number(job: Job) -> str:
         job.candidates,
         job.with_local,
         job.stretches,
+        job.rivals,
+        None if job.scatter is None else job.scatter.tobytes(),
+        None if job.function is None else _number_of_function(job.function),
         job.noise,
         job.imu,
         None if job.about is None else sorted(job.about.items()),
@@ -218,6 +222,11 @@ def job_number(job: Job) -> str:
         else (job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()),
     )
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
+
+
+def _number_of_function(shared: SharedFunction) -> tuple[object, ...]:
+    """Tell functions that a set shares apart: where they are, of which sensors and how large."""
+    return shared.functions.knots.tobytes(), shared.sensors, sorted(shared.size.items())
 
 
 @lru_cache(maxsize=1)

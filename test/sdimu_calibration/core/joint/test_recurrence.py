@@ -129,6 +129,29 @@ def test_recordings_in_the_same_order_do_not_tell_attitude_from_time():
     assert next_steps(_found((0.95, 0.02, np.nan), 0.96), True) == [Advice(Do.TRY_FORCE_EQUATION)]
 
 
+def test_three_kinds_that_come_in_one_order_have_a_third_each(clean):
+    """Whatever shares its partners with the attitude is as likely: the same warm-up in the same order, as one."""
+    same = clean.likeness[ATTITUDE]
+    left = replace(clean, likeness={ATTITUDE: same, TIME: same, TEMPERATURE: same})
+    accel = left.sensor == 3
+    root = np.linalg.cholesky(same[np.ix_(accel, accel)] + 1e-6 * np.eye(accel.sum()))
+    u = np.zeros(len(accel))
+    u[accel] = 10.0 * root @ np.random.default_rng(200).standard_normal(accel.sum())
+    found = recurrence(drawn(left, u, 0))
+    assert found is not None
+    assert found.probability > 0.9
+    assert found.answer == (ATTITUDE, TIME, TEMPERATURE)
+    assert not found.apart
+    assert len({round(k.probability, 9) for k in found.kinds}) == 1
+    assert sum(k.probability for k in found.kinds) == pytest.approx(found.probability)
+
+
+def test_an_improbable_return_excludes_a_function_and_silence_does_not():
+    assert _found((0.1, 0.5, np.nan), 0.55).excludes_attitude
+    assert not _found((0.3, 0.1, np.nan), 0.4).excludes_attitude
+    assert not _found((np.nan, 0.1, np.nan), 0.1).excludes_attitude
+
+
 @pytest.mark.slow
 def test_a_set_says_what_comes_back(tmp_path):
     """A shape that no effect of the catalogue has; noise takes it in where a recording is alone."""
@@ -169,6 +192,7 @@ def _found(shares: tuple[float, float, float], any_kind: float) -> Recurrence:
         (_found((0.04, 0.03, np.nan), 0.07), "does not come back at the same attitude or time after the", "mount"),
         (_found((0.02, 0.3, np.nan), 0.32), "is open (32 %): nearest is the same time after the start", "--backwards"),
         (_found((0.46, 0.45, np.nan), 0.9), "attitude (46 %) or time after the start (45 %)", "--backwards"),
+        (_found((0.0, 0.5, 0.5), 1.0), "the temperature of these recordings does not tell which", "Soaks"),
         (_found((np.nan, np.nan, np.nan), 0.0), "share too few stops", "--backwards"),
     ],
 )

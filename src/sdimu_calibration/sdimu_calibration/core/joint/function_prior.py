@@ -16,7 +16,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
-from sdimu_calibration.core.posterior.noise_models import ODDS, Sizes
+from sdimu_calibration.core.posterior.noise_models import ODDS, SENSORS, Sizes
 
 _STEPS = np.arange(-2.0, 5.0)
 """Powers of `_RATIO` by which sizes differ from that of the fit (1): what is told falsely takes most of a function."""
@@ -58,6 +58,7 @@ class FunctionPrior:
         self._evidence = evidence
         self.sizes: list[Floats] = []
         self._shares: list[Floats] = []
+        self._triads: list[str] = []
         place = {name: k for k, name in enumerate(evidence.names[: len(evidence.weight)])}
         labels = [] if shared is None else [(s, np.array(shared.labels)[shared.of(s)].tolist()) for s in shared.sensors]
         for sensor, own in labels:
@@ -65,8 +66,9 @@ class FunctionPrior:
             size = float(evidence.weight[at[0]]) ** -0.5
             tried = size * np.concatenate([[_NONE], _RATIO**_STEPS])
             term = NoiseTerm(next(t for t in TRIADS if sensor.startswith(t)), ATTITUDE)
-            share = np.log(ODDS[ATTITUDE] * np.log(_RATIO)) + usual.log_density(term, tried)
+            share = np.log(np.log(_RATIO)) + usual.log_density(term, tried)
             share[0] = 0.0
+            self._triads.append(term.triad)
             self._columns.append(at)
             self.sizes.append(tried)
             self._shares.append(share)
@@ -78,7 +80,10 @@ class FunctionPrior:
 
     def log_prior(self, chosen: Sequence[int]) -> float:
         """Log of the odds of some sizes beside none (1)."""
-        return float(sum(share[k] for share, k in zip(self._shares, chosen, strict=True)))
+        sizes = float(sum(share[k] for share, k in zip(self._shares, chosen, strict=True)))
+        # The odds of a triad are shared by the choices of its sensors, as those of a single recording are.
+        having = {triad for triad, k in zip(self._triads, chosen, strict=True) if k}
+        return sizes + len(having) * float(np.log(ODDS[ATTITUDE] / len(SENSORS)))
 
     def change(self, chosen: Sequence[int]) -> Change:
         """Give what some sizes change of what is known of the weights."""

@@ -27,7 +27,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
-from sdimu_calibration.core.joint.leftovers import KINDS, Leftovers
+from sdimu_calibration.core.joint.leftovers import ATTITUDE, KINDS, Leftovers
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 
 _LEFT = 1e-3
@@ -86,7 +86,8 @@ class Recurrence:
     def answer(self) -> tuple[str, ...]:
         """Kinds that leftovers come back with; several where the recordings cannot tell them apart; none: empty."""
         likely = tuple(k.kind for k in self.kinds if k.probability > PROBABLE)
-        open_ = tuple(k.kind for k in self.kinds if k.probability > _OPEN)
+        # Three that nothing tells apart have a third each.
+        open_ = tuple(k.kind for k in self.kinds if k.probability > _OPEN * self.probability)
         return likely or (open_ if self.probability > PROBABLE and len(open_) > 1 else ())
 
     @property
@@ -98,6 +99,11 @@ class Recurrence:
     def told(self) -> tuple[str, ...]:
         """Kinds of which the recordings say something."""
         return tuple(k.kind for k in self.kinds if np.isfinite(k.probability))
+
+    @property
+    def excludes_attitude(self) -> bool:
+        """Whether it is improbable that they come back with the attitude; never where the recordings say nothing."""
+        return any(k.kind == ATTITUDE and k.probability < _OPEN for k in self.kinds)
 
     @property
     def is_open(self) -> bool:
@@ -149,12 +155,20 @@ def _weighed(left: Leftovers, main: Sequence[int]) -> dict[str, float]:
     probable = [kind for kind in said if _share(gain, (kind,)) > _BOTH]
     gain |= {both: _mean(_gains(left, own, alone, main, both)) for both in combinations(probable, 2)}
     found = {kind: sum(_share(gain, kinds) for kinds in gain if kind in kinds) for kind in said}
-    for one, other in combinations(said, 2):
-        if left.coincide(one, other) > _SAME_ORDER:
-            # What a turn leaves in the stop behind it follows the order, whatever causes it.
-            either = sum(_share(gain, kinds) for kinds in gain if one in kinds or other in kinds)
-            found |= {one: 0.5 * either, other: 0.5 * either}
+    for alike in _in_one_order(left, said):
+        # What a turn leaves in the stop behind it follows the order, whatever causes it.
+        any_of = sum(_share(gain, kinds) for kinds in gain if alike & set(kinds))
+        found |= dict.fromkeys(alike, any_of / len(alike))
     return found | {"": 1.0 - _share(gain, ())}
+
+
+def _in_one_order(left: Leftovers, kinds: Sequence[str]) -> list[set[str]]:
+    """Part kinds into those that the recordings cannot tell apart, as the dwells have the same partners in them."""
+    groups: list[set[str]] = []
+    for kind in kinds:
+        near = [g for g in groups if any(left.coincide(kind, other) > _SAME_ORDER for other in g)]
+        groups = [*(g for g in groups if g not in near), {kind}.union(*near)]
+    return groups
 
 
 def _mean(gains: Floats) -> float:

@@ -36,9 +36,8 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
         )
         if not found.apart:
             told = shown.replace(" and ", " or ")
-            return (
-                f"{what} comes back at the same {told}: the order of the stops in these recordings does not tell which."
-            )
+            why = "the order of the stops in" if ATTITUDE in found.answer else "the temperature of"
+            return f"{what} comes back at the same {told}: {why} these recordings does not tell which."
         belongs = " and ".join(_BELONGS[kind] for kind in found.answer)
         return f"{what} in {listing(found.sensors)} comes back at the same {shown}: it belongs to {belongs}."
     if not found.told:
@@ -68,8 +67,10 @@ def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]
         return [_NEXT[ATTITUDE]]
     if found is None:
         return []
+    if found.answer and not found.apart:
+        return [Advice(Do.REVERSE_AND_ADD) if ATTITUDE in found.answer else _NEXT[TEMPERATURE]]
     if found.answer:
-        return [_NEXT[kind] for kind in found.answer] if found.apart else [Advice(Do.REVERSE_AND_ADD)]
+        return [_NEXT[kind] for kind in found.answer]
     if ATTITUDE not in found.told or found.is_open:
         return [Advice(Do.REVERSE_AND_ADD)]
     return [Advice(Do.LOOK_AT_MOUNT)]

@@ -70,8 +70,8 @@ class SetDiagnosis:
     probabilities: Probabilities | None = None
     """Of nothing, and of each family of effects in all recordings, at the end of the search; None where it did not come
     to an end."""
-    function: float = 0.0
-    """Probability that an unknown function of the attitude is in all recordings; 0 where none was looked for."""
+    function: float | None = None
+    """Probability that an unknown function of the attitude is in all recordings; None where none was looked for."""
     unknown: tuple[UnknownFunction, ...] = ()
     """The function of the attitude that explains what is left, at all stops; empty without one."""
 
@@ -94,12 +94,16 @@ def diagnose_set(
     refused: tuple[SetFinding, ...] = ()
     why = ""
     # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
-    shared = again is not None and not again.answer and not facts.is_of_some
+    # Where attitudes come back and the error does not, recordings have functions of their own, which are noise of each.
+    shared = again is not None and not (again.answer or again.excludes_attitude or facts.is_of_some)
+    function: float | None = None
     if again is not None and (shared or ATTITUDE in again.answer):
         beside = with_function(found.after, again.sensors, run)
         beside_it = search_beside(found, beside, options, run, extra, progress) if beside.function else found
+        function = beside_it.function if beside.function else None
         if beside_it.function > PROBABLE:
             found, earlier = beside_it, facts.findings
+            again = replace(again, sensors=found.with_function or again.sensors)
             facts = _facts(found, again)
             tags = {f.tag for f in facts.findings}
             refused = tuple(f for f in earlier if f.tag not in tags)
@@ -124,7 +128,7 @@ def diagnose_set(
         refused,
         _error_without(found),
         facts.told,
-        found.function if facts.beside_function else 0.0,
+        function,
         unknown_functions(found.after),
     )
 
@@ -142,7 +146,9 @@ def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> st
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
     too = f" It also explains {', '.join(names)}: not told." if names else ""
     of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
-    where = f"{listing(found.with_function)} ({in_percent(found.function)})"
+    # Where the search went to and fro no probabilities are told.
+    share = f" ({in_percent(found.function)})" if found.stood else ""
+    where = f"{listing(again.sensors)}{share}"
     return f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.{too}"
 
 

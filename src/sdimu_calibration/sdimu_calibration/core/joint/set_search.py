@@ -156,6 +156,9 @@ def search_beside(
         With the function and with what was found.
     """
     again = _searched(found.before, fit, found.told, options, run, extra, progress)
+    shared = again.after.function
+    if shared is not None:
+        again = replace(again, after=replace(again.after, function=replace(shared, told=again.with_function)))
     return replace(again, first=found.first, threshold=found.threshold)
 
 

@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.linear import E, LinearEvidence
 from sdimu_calibration.core.evidence.wander import Wander
+from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.likely_noise import likely_noise
 
@@ -38,6 +39,8 @@ class SharedFunction:
     """Direction of the force in b (1) at the stops of the recordings, shape (n, 3)."""
     size: Mapping[str, float]
     """One-sigma of the weights of a sensor (rad/s, m/s^2); empty where nobody knows it yet."""
+    told: tuple[str, ...] = ()
+    """Sensors that more likely than not have them; empty where none was weighed yet."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -67,7 +70,7 @@ class SharedFunction:
 
 def is_weight(name: str) -> bool:
     """Tell a weight of a function from coefficients by its name."""
-    return _WEIGHT in name
+    return _WEIGHT in split_tag(name)[0]
 
 
 def beside(evidence: E, shared: SharedFunction) -> E:

@@ -242,11 +242,11 @@ class FitSession:
 
         `fit`: of the setting; `told`: its diagnosis. None where the recording is too short, or by hand.
         """
-        below = [self._once_more(setting.rung(count), tell) for count in range(len(setting.added))]
-        first, *others = *below, fit
-        rivals = [(f"+ {named(text)}", one) for text, one in zip(setting.added, others, strict=True)]
-        rivals += [(FOUND, told.extended)] if len(told.found.chosen) else []
         try:
+            below = [self._once_more(setting.rung(count), tell) for count in range(len(setting.added))]
+            first, *others = *below, fit
+            rivals = [(f"+ {named(text)}", one) for text, one in zip(setting.added, others, strict=True)]
+            rivals += [(FOUND, told.extended)] if len(told.found.chosen) else []
             return in_use(ReportExtras(trials=first.free_inertial(rivals)))
         except DataError:
             return None

@@ -313,7 +313,7 @@ class SetDiagnosisFile(ResultModel):
     sentence: Said = ""
     threshold: Number = np.nan
     probabilities: Row = None
-    function: Number = 0.0
+    function: Number | None = None
     findings: Rows = ()
     refused: tuple[Line, ...] = ()
     held_out_before: Number = np.nan
