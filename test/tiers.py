@@ -41,6 +41,7 @@ LONG = {
         "test_it_changes_next_to_nothing_where_nothing_is_left",
         "test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_attitudes",
         "test_coefficients_are_as_good_as_their_sigmas_say",
+        "test_recordings_with_functions_of_their_own_share_none",
     ),
     "test/sdimu_calibration/core/joint/test_static_sets.py": (
         "test_six_rests_of_a_cube_are_a_set",

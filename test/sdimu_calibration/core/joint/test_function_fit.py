@@ -113,3 +113,16 @@ def check_drawn(found):
     # Some twenty attitudes: the root scatters by .16 about one.
     assert np.sqrt(np.mean(z**2)) < 1.6
     assert one.sigma[:, 0].max() < 0.5 * to_si(40.0, "ug")
+
+
+def test_recordings_with_functions_of_their_own_share_none(options):
+    """Two waves in one sensor, one a recording, were told as one function, with steps and changes that were certain."""
+    other = "accel_x: sin(-6 fx/g + 5 fz/g + 1)=40 ug"
+    plans = [FORTH, backwards(FORTH)]
+    first, second = (unit_set(311, plans, (hidden,)) for hidden in ("accel_x: sin(7 fx/g + 4 fy/g)=40 ug", other))
+    found = diagnose_set((first.members[0], second.members[1]), options, here)
+    assert found.recurrence is not None
+    assert found.function is None
+    assert found.unknown == ()
+    assert found.findings == ()
+    assert "does not come back at the same attitude" in found.sentence
