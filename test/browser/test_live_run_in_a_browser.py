@@ -73,9 +73,10 @@ def watched(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         wait_until_served(port, process)
         page.goto(f"http://127.0.0.1:{port}/")
         # Seen while the test runs: some of the eighteen stops.
-        page.wait_for_function(r"/stop ([2-9]|1\d) of 18/.test(document.querySelector('#place').textContent)")
+        page.wait_for_function(r"/stop ([2-9]|1\d) of 18/.test(document.querySelector('#place')?.textContent ?? '')")
         page.wait_for_function("document.querySelector('#ended').classList.contains('good')")
         page.wait_for_function("document.querySelector('#verdict').textContent.includes('Up to stop 18')")
+        page.wait_for_selector("#heat .js-plotly-plot", state="attached")
         heat = page.evaluate(
             "document.querySelector('#heat .js-plotly-plot')._fullData[0].z.map(row => Array.from(row))"
         )
