@@ -60,14 +60,7 @@ def in_size(fit: SetFit) -> SetFit:
     if fit.function is None:
         return fit
     sizes = function_sizes(fit, fit.reports, fit.function)
-    return with_size(fit, sizes.likeliest(fit.function.size))
-
-
-def with_size(fit: SetFit, size: Mapping[str, float]) -> SetFit:
-    """Return a fit beside a function in another size (SI), by sensor."""
-    if fit.function is None:
-        return fit
-    shared = replace(fit.function, size=dict(size))
+    shared = replace(fit.function, size=sizes.likeliest(fit.function.size))
     known = dict(zip(shared.labels, shared.known.tolist(), strict=True))
 
     def in_prior(report: Report) -> Report:
@@ -122,11 +115,6 @@ class FunctionSizes:
     """On the weights, each over the size at which it is seen; coefficients and deviations integrated."""
     constant: float
     """What the log-likelihood has beside that of the weights (1)."""
-
-    @property
-    def least(self) -> dict[str, float]:
-        """Sizes (SI) so small that the function is as good as none."""
-        return {sensor: float(_RATIOS[0]) * size for sensor, size in self.seen.items()}
 
     def log_likelihood(self, size: Mapping[str, float]) -> float:
         """Log-likelihood of the sizes, coefficients and weights integrated over their priors.

@@ -93,7 +93,7 @@ class FunctionPrior:
         ]
         columns = np.concatenate([np.zeros(0, dtype=np.int64), *self._columns])
         before, after = np.concatenate([np.zeros(0), *fitted]), np.concatenate([np.zeros(0), *known])
-        log_det = float(np.sum(np.log(before / np.where(after > 0.0, after, 1.0))))
+        log_det = float(np.sum(np.log(before / after)))
         return Change(columns, after - before, -self._evidence.shift[columns], log_det)
 
     def nearest(self, size: Sequence[float]) -> tuple[int, ...]:
