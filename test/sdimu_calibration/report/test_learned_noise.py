@@ -168,9 +168,11 @@ def test_p_takes_the_nis_in_white_noise_and_is_called_so(learned, diagnosis):
 
 def test_noise_is_remarked_and_no_advice(learned):
     line = "gyro white noise is 1.30 +- 0.02 times the specification"
-    told = first_screen.of_diagnosis(summarise(replace(learned, noise=(line,), sentence="The noise model is wrong.")))
+    told = first_screen.of_diagnosis(
+        summarise(replace(learned, noise=(line,), statements=("The noise model is wrong.",)))
+    )
     assert not any(line in text for text in told.advice)
     assert any("1.30" in text for text in told.remarks)
-    whole = replace(learned, noise=(line,), sentence=f"The noise is wrong: {line}.")
+    whole = replace(learned, noise=(line,), statements=(f"The noise is wrong: {line}.",))
     said = first_screen.of_diagnosis(summarise(whole))
     assert not any("1.30" in text for text in said.remarks)

@@ -12,7 +12,7 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import decimals
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.diagnosis.verdict import sentence
+from sdimu_calibration.core.diagnosis.verdict import statements
 from sdimu_calibration.core.estimation.free_inertial import NOTHING
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.results import NOT_TRUSTED, Calibration
@@ -179,7 +179,7 @@ def held_to_use(d: Diagnosis, more: ReportExtras | None) -> Diagnosis:
         f"{metres(use.as_given)} without it, {metres(use.promised)} as predicted: the estimate is {NOT_TRUSTED}"
     )
     after = d.after.warned(Note(told, Topic.NOT_TRUSTED))
-    return replace(d, sentence=sentence(d, d.found_effects, held=False), after=after)
+    return replace(d, statements=statements(d, d.found_effects, held=False), after=after)
 
 
 def in_use(more: ReportExtras | None) -> InUse | None:

@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind, Verb
-from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
-from sdimu_calibration.core.diagnosis.verdict import statements
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.navigation_fit import MISFIT
 from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
@@ -111,10 +109,7 @@ def _judged(summary: DiagnosisSummary, doubts: bool) -> tuple[str, str]:
 
 def _head(summary: DiagnosisSummary) -> str:
     """Verdict as HTML, a line a grade, the equation of each effect that was found under its name."""
-    html = "".join(f'<span class="grade">{_led(one)}</span>' for one in _statements(summary.diagnosis))
-    html = html.replace("(-", "(\N{MINUS SIGN}")
-    # A line never ends between a number and its sigma or its per cent.
-    html = html.replace(" \N{PLUS-MINUS SIGN} ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
+    html = _in_lines(summary.diagnosis.statements)
     for one in summary.candidates:
         words = name_of(one)
         shown = tip(words, one.candidate.effect, [one.candidate.label])
@@ -122,19 +117,17 @@ def _head(summary: DiagnosisSummary) -> str:
     return html
 
 
+def _in_lines(statements: Sequence[str]) -> str:
+    """Return statements as HTML, a line each; none ends between a number and its sigma or its per cent."""
+    html = "".join(f'<span class="grade">{_led(one)}</span>' for one in statements)
+    html = html.replace("(-", "(\N{MINUS SIGN}")
+    return html.replace(" \N{PLUS-MINUS SIGN} ", "\u00a0\N{PLUS-MINUS SIGN}\u00a0").replace(" %", "\u00a0%")
+
+
 def _led(statement: str) -> str:
     """Return a statement with the words before its colon, how sure it is, in bold."""
     lead, colon, rest = statement.partition(": ")
     return f"<strong>{prose(lead)}:</strong> {prose(rest)}" if colon and len(lead) <= _LEAD else prose(statement)
-
-
-def _statements(d: Diagnosis) -> tuple[str, ...]:
-    """Return the statements of which the sentence of a diagnosis is made."""
-    for held in (True, False):
-        told = statements(d, d.found_effects, held)
-        if " ".join(told) == d.sentence:
-            return told
-    return (d.sentence,)
 
 
 def _remarks(calibration: Calibration) -> tuple[str, ...]:
@@ -171,12 +164,15 @@ _OFF = ("coefficient", "value", "wrong by", "unit", "in sigmas")
 """Headings of the coefficients that are wrong: the last two are of what is wrong."""
 
 
-def _off_table(worst: Sequence[Off]) -> str:
-    """Return the coefficients that are wrong without what was found: the better value, and by how much; or nothing."""
+def _off_table(worst: Sequence[Off], sigma: str = OVER_MODELS) -> str:
+    """Return the coefficients that are wrong without what was found: the better value, and by how much; or nothing.
+
+    `sigma`: what stands behind the sign.
+    """
     if not worst:
         return ""
     rows = [[one.name, signs(one.better), signs(one.alone), one.unit, f"{abs(one.sigmas):.1f}"] for one in worst]
-    told = f"\N{PLUS-MINUS SIGN}: {OVER_MODELS}."
+    told = f"\N{PLUS-MINUS SIGN}: {sigma}."
     return grid(_OFF, rows, {0, 3}) + quiet(told)
 
 
@@ -238,7 +234,9 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     told = tuple(advice_html(one, spell) for one in advice)
     tone, tag = set_judged(found)
     title = _COSTS if found.findings else _PREDICTS
-    return FirstScreen(tone, prose(found.sentence), tuple(costs), told, title, tag=tag, off=_off_table(off[:_WORST]))
+    # Where the search went to and fro the coefficients are those of the joint fit.
+    worst = _off_table(off[:_WORST], OVER_MODELS if found.probabilities else "one sigma of the joint fit")
+    return FirstScreen(tone, _in_lines(found.statements), tuple(costs), told, title, tag=tag, off=worst)
 
 
 def set_judged(found: SetDiagnosis) -> tuple[str, str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 
+from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.family import BIAS_DRIFT
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities
@@ -24,12 +25,15 @@ _HEAD = ("", "probability", "", "size if it is this")
 
 
 def odds_section(
-    told: Probabilities | None, where: str = "in this test", found: Mapping[str, str] | None = None
+    told: Probabilities | None,
+    where: str = "in this test",
+    found: Mapping[str, str] | None = None,
+    functions: Sequence[tuple[str, float]] = (),
 ) -> str:
     """Return the section; empty where there are no probabilities.
 
     `where`: what the data are of, as it ends a sentence; `found`: sizes in words of what the page tells as found, by
-    label: a size stands on a page once.
+    label: a size stands on a page once; `functions`: of unknown functions, in words, with their probability.
     """
     sizes = found or {}
     if told is None:
@@ -42,6 +46,7 @@ def odds_section(
             lines += [
                 _line(m.label, m.probability, True, sizes.get(m.label) or _size(m)) for m in family.members[:_MOST]
             ]
+    lines += [_line(words, p) for words, p in functions if p >= _LEAST]
     lines += [_line(_noise(n), n.probability) for n in told.noise if n.probability >= _LEAST]
     head = "".join(f'<th scope="col"{" class=text" if k == 0 else ""}>{word}</th>' for k, word in enumerate(_HEAD))
     rest = (
@@ -59,6 +64,16 @@ def odds_section(
             "Coefficients and sigmas of this page are means over these models."
         ),
     )
+
+
+def odds_of_set(found: SetDiagnosis) -> str:
+    """Return the section of a set, with the functions of the attitude that were looked for."""
+    of_all = "An unknown function of the attitude, the same in all recordings"
+    told = [
+        (f"{of_all if one.is_common else f'One of {one.recording} alone'} ({', '.join(one.sensors)})", one.probability)
+        for one in found.functions
+    ]
+    return odds_section(found.probabilities, "in these recordings", functions=told)
 
 
 def family_in_words(family: FamilyShare) -> str:

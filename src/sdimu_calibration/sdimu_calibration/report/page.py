@@ -24,7 +24,7 @@ from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section
-from sdimu_calibration.report.odds_section import odds_section
+from sdimu_calibration.report.odds_section import odds_of_set, odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections
 from sdimu_calibration.report.statistics_section import noise_section
@@ -119,7 +119,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
     parts = [
         _first(calibration, contents, fit, draw),
         coefficients_section(calibration, fit, contents.truth, contents.reference, _lacks(calibration, summary), draw),
-        odds_section(of_set.probabilities, "in these recordings") if of_set is not None else "",
+        odds_of_set(of_set) if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         unknown_section(of_set.unknown, draw) if of_set is not None else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),

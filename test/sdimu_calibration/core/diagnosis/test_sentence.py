@@ -15,18 +15,22 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, _beside_wrong_p
 from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
-from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, something_missing, verdict
+from sdimu_calibration.core.diagnosis.verdict import Facts, something_missing, statements, verdict
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.fit_statistics import FitStatistics
+from sdimu_calibration.core.joint.set_search import FunctionShare
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
-from sdimu_calibration.core.joint.set_verdict import sentence as sentence_of_set
+from sdimu_calibration.core.joint.set_verdict import statements as statements_of_set
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.family import family_of
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities, Share
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import cost, first_screen
+
+
+def sentence(d, found, held=True):
+    return " ".join(statements(d, found, held))
 
 
 @pytest.fixture(scope="module")
@@ -242,31 +246,28 @@ def test_a_set_whose_search_came_to_no_end_is_not_called_consistent(summary):
     assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.4, (), ()))) == Verdict.CLASS_OF_EFFECTS
 
 
-def report_of(nis, *kinds, stops=28):
-    """A report with this NIS in white noise, of 1 in noise of these kinds that it learned."""
-    noise = tuple(NoiseTerm("gyro", kind, size=1.0) for kind in kinds)
-    in_noise = 1.0 if kinds else None
-    statistics = FitStatistics(0.0, nis, 100.0, 3.0, nis_in_noise=in_noise)
-    return SimpleNamespace(noise=noise, statistics=statistics, by_hand=None, times=SimpleNamespace(stops=range(stops)))
+def test_a_set_is_unexplained_where_a_recording_has_noise_that_no_sensor_has(summary):
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None}, warnings=())
+    drawn = {"r0": (NoiseTerm("gyro", STOP, size=1.0),), "r2": (NoiseTerm("gyro", STOP, size=2.0),)}
+    facts = SetFacts([], after, SimpleNamespace(reports=()), None, Probabilities(0.9, (), ()), drawn=drawn)
+    assert verdict_of_set(facts) == Verdict.UNEXPLAINED
+    told = statements_of_set(Verdict.UNEXPLAINED, facts)
+    assert told[1].startswith("What is left looks like gyro bias drawn anew at each stop in r0 and r2; the sigmas")
 
 
-@pytest.mark.parametrize(
-    ("reports", "word"),
-    [
-        ((report_of(5.0, STOP), report_of(1.0)), Verdict.UNEXPLAINED),
-        # Both are loud: the one has learned no noise, but it is no recording without an error.
-        ((report_of(5.0, STOP), report_of(5.0)), Verdict.CONSISTENT),
-        ((report_of(5.0, STOP), report_of(5.0, STOP)), Verdict.CONSISTENT),
-        # In a single rest nothing changes that an effect could follow.
-        ((report_of(5.0, STOP, stops=1), report_of(1.0, stops=1)), Verdict.CONSISTENT),
-        # What data sheets know takes in the noise of its own.
-        ((report_of(5.0, FLICKER), report_of(1.0)), Verdict.CONSISTENT),
-    ],
-)
-def test_a_set_of_a_loud_and_a_quiet_recording_is_unexplained(summary, reports, word):
-    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
-    fit = SimpleNamespace(function=None, reports=reports)
-    assert verdict_of_set(SetFacts([], after, fit, None, Probabilities(0.9, (), ()))) == word
+def test_a_set_of_which_recordings_have_functions_of_their_own_is_unexplained(summary):
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None}, warnings=())
+    own = [FunctionShare(name, 0.97, ("accel_x",)) for name in ("r0", "r1")]
+    facts = SetFacts([], after, SimpleNamespace(reports=()), None, Probabilities(0.9, (), ()), own)
+    assert verdict_of_set(facts) == Verdict.UNEXPLAINED
+    assert not facts.beside_function
+    told = statements_of_set(Verdict.UNEXPLAINED, facts)
+    assert told == (
+        "Something differs between the recordings that no effect of the catalogue explains.",
+        "An error that follows the attitude, another one in each, is in r0 (accel_x, 97 %) and r1 (accel_x, 97 %).",
+    )
+    common = replace(facts, functions=[FunctionShare("", 0.97, ("accel_x",))])
+    assert statements_of_set(Verdict.UNEXPLAINED, common)[0].startswith("The recordings share something")
 
 
 def test_a_coefficient_of_one_recording_is_named_with_it():
@@ -346,13 +347,23 @@ def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, ver
     after = replace(d.after, fit={**d.after.fit, "held_out_rms": error})
     findings = (object(),) if verdict == Verdict.ONE_EFFECT else ()
     found = SimpleNamespace(
-        verdict=verdict, sentence="x", before=d.before, after=after, error_without=None, findings=findings, advice=()
+        verdict=verdict,
+        statements=("x",),
+        before=d.before,
+        after=after,
+        error_without=None,
+        findings=findings,
+        advice=(),
+        probabilities=Probabilities(0.9, (), ()) if error == 1.0 else None,
     )
     first = first_screen.of_set(found)
     assert first.tone == tone
     assert first.tag != "The model is wrong" or tone == "bad"
     assert first.advice == (f"Use the coefficients of this page{', which hold what was found' if findings else ''}.",)
     assert ("wrong by" in first.off) == bool(findings)
+    assert ("over all models" in first.off) == bool(findings)
+    joint = first_screen.of_set(SimpleNamespace(**{**vars(found), "probabilities": None}))
+    assert ("one sigma of the joint fit" in joint.off) == bool(findings)
 
 
 def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
@@ -371,7 +382,7 @@ def test_what_a_set_finds_beside_what_is_unexplained_has_its_grade(summary):
     of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.7, (Share("gyro_bias_warm_up_x", 0.7),))
     after = replace(summary.diagnosis.after, of_set=None, warnings=())
     facts = SetFacts([of_set], after, SimpleNamespace(function=None, reports=()), None, None)
-    words = sentence_of_set(Verdict.UNEXPLAINED, facts)
+    words = " ".join(statements_of_set(Verdict.UNEXPLAINED, facts))
     assert words.startswith("Something differs between the recordings that no effect of the catalogue explains. ")
     assert "Found beside it: Likely (70 %): gyro warm-up" in words
 

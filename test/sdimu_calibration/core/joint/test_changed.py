@@ -68,9 +68,9 @@ def many(against):
     ("against", "says"), [("r1", "r1 and r2 differ in 5 coefficients"), ("", "in r2, the unit differs in 5")]
 )
 def test_so_many_coefficients_that_changed_are_told_as_another_unit_or_other_axes(against, says):
-    told = _found(Verdict.DATA_FAULT, SetFacts(many(against), None, None, None, None))
+    (told,) = _found(Verdict.DATA_FAULT, SetFacts(many(against), None, None, None, None))
     assert told.startswith(f"Not one unit, or one that was changed, or axes or units that are read otherwise: {says}")
-    few = _found(Verdict.DATA_FAULT, SetFacts(many(against)[:3], None, None, None, None))
+    (few,) = _found(Verdict.DATA_FAULT, SetFacts(many(against)[:3], None, None, None, None))
     assert few.startswith("All recordings agree but for")
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
 from sdimu_calibration.core.joint.function_fit import function_sizes
-from sdimu_calibration.core.joint.function_prior import FunctionPrior
+from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior
 from sdimu_calibration.core.joint.reduction import Reduction
+from sdimu_calibration.core.joint.set_board import Share, beside_own
 from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.posterior.noise_models import usual_sizes
 from sdimu_calibration.storage.files.config import load_imu
@@ -100,7 +101,8 @@ def test_another_size_on_the_board_is_that_of_a_fit_in_this_size():
         names=(*NAMES, *labels), weight=np.concatenate([WEIGHT, SHARED.known]), shift=-theta, imu=load_imu("dtg")
     )
     prior = FunctionPrior(SHARED, evidence, usual_sizes(evidence.imu))  # type: ignore[arg-type]
-    of_fit = prior.nearest([SHARED.size[s] for s in SHARED.sensors])
+    of_fit = prior.nearest(SHARED.size)
+    assert of_fit == (OF_FIT, OF_FIT)
     assert np.allclose(prior.change(of_fit).more, 0.0, atol=1e-9 * SHARED.known.max())
     for chosen in ((0, 0), (2, of_fit[1]), (6, 3)):
         change = prior.change(chosen)
@@ -116,6 +118,19 @@ def test_another_size_on_the_board_is_that_of_a_fit_in_this_size():
         explained = d @ step - change.more @ change.values**2
         gained = 0.5 * (explained - change.log_det - np.linalg.slogdet(J)[1] + np.linalg.slogdet(fitted)[1])
         assert gained == pytest.approx(likelihood - at_size, abs=1e-6)
+
+
+def test_a_function_of_one_recording_adds_to_the_common_one():
+    """Its weights integrated: the likelihood of rows with the covariance of weights that are theirs alone."""
+    rng = np.random.default_rng(8)
+    p, size = 3, np.array([0.7, 2.0])
+    A, y = rng.standard_normal((12, p + 2)), rng.standard_normal(12)
+    said = beside_own(Share(A.T @ A, A.T @ y, 0.0, 0.0), np.array([3, 4]), size)
+    covariance = np.eye(12) + (A[:, 3:] * size**2) @ A[:, 3:].T
+    np.testing.assert_allclose(said.J, A.T @ np.linalg.solve(covariance, A), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(said.d, A.T @ np.linalg.solve(covariance, y), rtol=1e-9, atol=1e-12)
+    assert said.explained == pytest.approx(y @ y - y @ np.linalg.solve(covariance, y))
+    assert said.log_det == pytest.approx(np.linalg.slogdet(covariance)[1])
 
 
 def test_a_set_without_a_function_has_no_sizes():

@@ -146,10 +146,18 @@ def test_three_kinds_that_come_in_one_order_have_a_third_each(clean):
     assert sum(k.probability for k in found.kinds) == pytest.approx(found.probability)
 
 
-def test_an_improbable_return_excludes_a_function_and_silence_does_not():
-    assert _found((0.1, 0.5, np.nan), 0.55).excludes_attitude
-    assert not _found((0.3, 0.1, np.nan), 0.4).excludes_attitude
-    assert not _found((np.nan, 0.1, np.nan), 0.1).excludes_attitude
+def test_what_all_rows_tell_of_a_kind_stands_in_the_place_of_what_stops_tell():
+    # Independent kinds: 1 - (1 - .9)(1 - .2) is .92 of any.
+    judged = _found((0.9, 0.2, np.nan), 0.92).judged(ATTITUDE, 0.1)
+    assert [k.probability for k in judged.kinds[:2]] == [0.1, 0.2]
+    assert judged.probability == pytest.approx(1.0 - 0.9 * 0.8)
+    assert judged.answer == ()
+    # Where stops said nothing the rows alone tell.
+    silent = _found((np.nan, 0.1, np.nan), 0.1).judged(ATTITUDE, 0.98)
+    assert not _found((np.nan, 0.1, np.nan), 0.1).may_come_back(ATTITUDE)
+    assert _found((0.3, 0.1, np.nan), 0.4).may_come_back(ATTITUDE)
+    assert silent.answer == (ATTITUDE,)
+    assert silent.probability == pytest.approx(1.0 - 0.02 * 0.9)
 
 
 @pytest.mark.slow

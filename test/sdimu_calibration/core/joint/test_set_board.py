@@ -13,9 +13,10 @@ from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.rival_noises import rival_noises
-from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
+from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import set_evidence
 from sdimu_calibration.core.joint.set_fit import asked_again, fit_set, with_reports
+from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.storage.files.config import load_model

@@ -23,7 +23,7 @@ from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise, i
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO, Round, in_found_noise, searched
 from sdimu_calibration.core.diagnosis.screen import Finding, screen
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search
-from sdimu_calibration.core.diagnosis.verdict import Facts, sentence, verdict
+from sdimu_calibration.core.diagnosis.verdict import Facts, statements, verdict
 from sdimu_calibration.core.diagnosis.white_noise import without_memory
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit
@@ -58,8 +58,8 @@ class Diagnosis:
 
     verdict: Verdict
     """Of a `survey`: consistent or misfit."""
-    sentence: str
-    """The verdict for people."""
+    statements: tuple[str, ...]
+    """The verdict for people: what was found by how sure it is, then what is left."""
     adequate: bool
     p_value: float
     """Probability that a right model in white noise looks like this, from scan, free inputs and NIS together."""
@@ -89,6 +89,11 @@ class Diagnosis:
     """The fit as given and with each found effect added; empty where it was not asked for."""
     found_effects: tuple[Found, ...] = ()
     """What was found, one at a time; when the verdict is ``unexplained`` what was tried."""
+
+    @property
+    def sentence(self) -> str:
+        """The statements in one text."""
+        return " ".join(self.statements)
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -208,7 +213,7 @@ def climb(
     progress("done", 1.0)
     unspoken = Diagnosis(
         word,
-        "",
+        (),
         word == Verdict.CONSISTENT,
         p_value(done, consistency, bool(noise) or Alarm.NIS in raised),
         findings,
@@ -228,8 +233,9 @@ def climb(
         rungs,
     )
     found = found_effects(unspoken)
-    said = f"{_beside_wrong_prior(base, done)}{sentence(unspoken, found)}"
-    return replace(unspoken, sentence=said, found_effects=found)
+    said = statements(unspoken, found)
+    said = (f"{_beside_wrong_prior(base, done)}{said[0]}", *said[1:])
+    return replace(unspoken, statements=said, found_effects=found)
 
 
 def _beside_wrong_prior(base: Fit, done: Round) -> str:

@@ -45,7 +45,7 @@ def survey(fit: Fit, result: Calibration, with_candidates: bool = True) -> Diagn
     )
     return Diagnosis(
         Verdict.CONSISTENT if adequate else Verdict.MISFIT,
-        sentence,
+        (sentence,),
         adequate,
         rest.p_value,
         (),

@@ -44,7 +44,7 @@ _ROUNDING = 1e-6
 _EQUATION = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 
-_IF_NONE = "as noise, and may be too small if it is none"
+IF_NONE = "as noise, and may be too small if it is none"
 """What is said of sigmas that hold something unexplained."""
 _FITTED = "In what was fitted, but not beyond it"
 """What is said in the place of ``Certain`` where what was found fails on data that no fit has seen."""
@@ -89,11 +89,6 @@ def verdict(facts: Facts) -> Verdict:
         # Something is missing, and no class by itself is likely: together they are.
         return Verdict.CLASS_OF_EFFECTS
     return Verdict.NOISE_MODEL_WRONG if facts.noise else Verdict.CONSISTENT
-
-
-def sentence(d: Diagnosis, found: Sequence[Found], held: bool = True) -> str:
-    """Put the verdict into one text: the statements of `statements`."""
-    return " ".join(statements(d, found, held))
 
 
 def statements(d: Diagnosis, found: Sequence[Found], held: bool = True) -> tuple[str, ...]:
@@ -183,7 +178,7 @@ def _unexplained(d: Diagnosis, told: tuple[str, ...]) -> tuple[str, ...]:
         begun = "What is left is the" if names else "No effect of the catalogue explains the"
         # Noise that every sensor has is no part of what is unexplained.
         account = " and ".join(("it", *drawn))
-        return (*(told if names else ()), f"{begun} {' and '.join(follows)}; the sigmas count {account} {_IF_NONE}.")
+        return (*(told if names else ()), f"{begun} {' and '.join(follows)}; the sigmas count {account} {IF_NONE}.")
     like_effects = any(term.kind in DRAWN for term in d.found.noise)
     may_be = "" if names or like_effects else _may_be(d.probabilities)
     if may_be:
@@ -192,7 +187,7 @@ def _unexplained(d: Diagnosis, told: tuple[str, ...]) -> tuple[str, ...]:
         begun = "What is left" if names else "Something is missing that"
         looks = (
             f"{begun} looks like {' and '.join(drawn)}: a cause outside the catalogue, or a bias that does so; the "
-            f"sigmas count it {_IF_NONE}."
+            f"sigmas count it {IF_NONE}."
         )
         return (*(told if names else ()), looks)
     tail = f"; {names} would take {100 * d.explained:.0f} % of it" if names else ""

@@ -18,7 +18,7 @@ Sources: H. Patterson, R. Thompson, "Recovery of inter-block information when bl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -27,7 +27,7 @@ from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
-from sdimu_calibration.core.joint.leftovers import ATTITUDE, KINDS, Leftovers
+from sdimu_calibration.core.joint.leftovers import KINDS, Leftovers
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 
 _LEFT = 1e-3
@@ -100,10 +100,17 @@ class Recurrence:
         """Kinds of which the recordings say something."""
         return tuple(k.kind for k in self.kinds if np.isfinite(k.probability))
 
-    @property
-    def excludes_attitude(self) -> bool:
-        """Whether it is improbable that they come back with the attitude; never where the recordings say nothing."""
-        return any(k.kind == ATTITUDE and k.probability < _OPEN for k in self.kinds)
+    def may_come_back(self, kind: str) -> bool:
+        """Whether it is not improbable that they come back with a kind; False where the recordings say nothing."""
+        return any(k.kind == kind and k.probability > _OPEN for k in self.kinds)
+
+    def judged(self, kind: str, probability: float) -> Recurrence:
+        """Return the same with the probability of a kind that all rows tell, in the place of that which stops tell."""
+        before = float(np.nan_to_num(next(k.probability for k in self.kinds if k.kind == kind)))
+        kinds = tuple(replace(k, probability=probability) if k.kind == kind else k for k in self.kinds)
+        # That another kind comes back, given that this one does not.
+        without = (self.probability - before) / (1.0 - before) if before < 1.0 else 0.0
+        return replace(self, kinds=kinds, probability=probability + (1.0 - probability) * max(without, 0.0))
 
     @property
     def is_open(self) -> bool:

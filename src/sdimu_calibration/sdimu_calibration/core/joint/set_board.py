@@ -8,16 +8,18 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
 from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
-from sdimu_calibration.core.joint.function_prior import FunctionPrior
+from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior, OwnWeights
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.joint.set_noise import Layout, SetNoise
 from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
@@ -30,43 +32,15 @@ _NEAR = 6.0
 _HOPELESS = 10.0
 """Log posterior (1) behind nothing from which a candidate of one recording is left out: a window holds what is within 7
 of the best model, and all that is left out weighs a hundredth together."""
-FUNCTION = "function"
-"""Key of a function among the sizes of a noise."""
+_MOST_KEPT = 100
+"""Number of shares of power-ons that are kept at most: each is a matrix of all parameters, some megabytes."""
 _SWEEPS = 4
 """Number of times that the noise of each recording is chosen in turn: they hang on each other by the coefficients
 alone, which each recording knows well."""
 
 
 @dataclass(frozen=True)
-class SetNoise(NoiseModel):
-    """Noise of a set: that of each recording."""
-
-    chosen: tuple[int, ...] = ()
-    """Place of each among the noises of its recording, then of the size of each sensor's function; 0 is none."""
-    own: tuple[NoiseModel, ...] = ()
-    """Of each recording, in the order of the reports."""
-    log_prior_of_all: float = 0.0
-    """Of all of them together, beside white noise in all and no function (1)."""
-
-    @property
-    def log_prior(self) -> float:
-        """Log of the odds beside white noise in all recordings, of the share of the sizes too (1)."""
-        return self.log_prior_of_all
-
-    @cached_property
-    def sizes(self) -> Mapping[Hashable, float]:
-        """Size of each term (SI), by its recording and what it is; of a function its place: its sizes count apart."""
-        terms = {(k, t.identity): t.size for k, noise in enumerate(self.own) for t in noise.terms}
-        return terms | {(FUNCTION, k, size): size for k, size in enumerate(self.function) if size}
-
-    @property
-    def function(self) -> tuple[int, ...]:
-        """Place of the size of each sensor's function."""
-        return self.chosen[len(self.own) :]
-
-
-@dataclass(frozen=True)
-class _Share:
+class Share:
     """What some recordings say in their noises; attributes as of `InOneNoise`, the parameters those of the set."""
 
     J: Floats
@@ -116,9 +90,11 @@ class SetBoard(Board[SetEvidence]):
         self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self.functions = FunctionPrior(fit.function, evidence, usual_sizes(evidence.imu))
-        self._counts = (*map(len, self.rivals), *self.functions.counts)
+        self._layout = Layout(len(self.rivals), len(self.functions.counts))
+        self._counts = self._layout.choice([*map(len, self.rivals)], self.functions.counts, self.functions.counts)
         self._white = (0,) * len(self._counts)
         self._found: dict[Members, dict[tuple[int, ...], float]] = {}
+        self._kept: dict[Hashable, tuple[Ints, Share]] = {}
         self._usual = usual_sizes(evidence.imu)
         self._told = len(evidence.weight) + np.arange(len(told))
         self.known = self._names[: len(evidence.weight) + len(told)]
@@ -181,7 +157,12 @@ class SetBoard(Board[SetEvidence]):
         return max(self._tried(columns, weight).items(), key=lambda one: one[1])[0]
 
     def _tried(self, columns: Ints, weight: Floats) -> dict[tuple[int, ...], float]:
-        """Log posterior (1) of the noises that were tried until that of each recording stood, over white noise."""
+        """Log posterior (1) of the noises that were tried until that of each recording stood, over white noise.
+
+        A common function and functions of each recording alone exclude each other, and no single change leads from one
+        to the other: each is begun with.
+        """
+        self._kept = {}
         white = self._likelihood(self._white, columns, weight)
         found: dict[tuple[int, ...], float] = {}
 
@@ -193,19 +174,36 @@ class SetBoard(Board[SetEvidence]):
         def swept(best: tuple[int, ...]) -> tuple[int, ...]:
             for _ in range(_SWEEPS):
                 before = best
-                for k, count in enumerate(self._counts):
-                    best = max((_changed(best, k, other) for other in range(count)), key=score)
+                for k in range(len(self._counts)):
+                    best = max((_changed(best, k, other) for other in self._others(k, best[k])), key=score)
                 if best == before:
                     break
             return best
 
-        best = swept(self._white)
+        best = max(map(swept, self._begun()), key=score)
         # No single recording may ask for noise that all of them have: one kind after another.
         while True:
             together = max(self._of_unit(best), key=score, default=best)
             if not score(together) > score(best):
                 return found
             best = swept(together)
+
+    def _others(self, place: int, now: int) -> list[int]:
+        """Say what may stand at a place of a choice: any noise of a recording; of sizes none, this one and the next."""
+        count = self._counts[place]
+        if place < len(self.rivals):
+            return list(range(count))
+        # The likelihood has one maximum in the size.
+        near = {now - 1, now, now + 1} if now else {OF_FIT}
+        return sorted({0, *(k for k in near if 0 <= k < count)})
+
+    def _begun(self) -> list[tuple[int, ...]]:
+        """Choices to begin with: white noise, beside no function, a common one, and one of each recording."""
+        white, none = self._layout.noises(self._white), self._layout.common(self._white)
+        if not none:
+            return [self._white]
+        of_fit = (OF_FIT,) * len(none)
+        return [self._white, self._layout.choice(white, of_fit, none), self._layout.choice(white, none, of_fit)]
 
     def _of_unit(self, best: tuple[int, ...]) -> list[tuple[int, ...]]:
         """Choices in which one kind of noise is in all recordings; each recording else as near `best` as it can."""
@@ -275,14 +273,16 @@ class SetBoard(Board[SetEvidence]):
             same = [j for j, one in enumerate(every) if one.keys() == wanted.keys()]
             chosen[k] = min(same, key=lambda j: sum(abs(every[j][i] - wanted[i]) for i in wanted), default=chosen[k])
         if fit.function is not None:
-            chosen[len(self.rivals) :] = self.functions.nearest([fit.function.size[s] for s in fit.function.sensors])
+            none, size = self._layout.common(self._white), self.functions.nearest(fit.function.size)
+            return self._noise(self._layout.choice(chosen[: len(self.rivals)], size, none))
         return self._noise(tuple(chosen))
 
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:
         own = tuple(rivals[place].noise for rivals, place in zip(self.rivals, chosen, strict=False))
         terms = tuple(t for noise in own for t in noise.terms)
-        prior = log_prior_of_set(own, self._usual) + self.functions.log_prior(chosen[len(own) :])
-        return SetNoise(terms, (), chosen, own, prior)
+        common, alone = self._layout.common(chosen), self._layout.own(chosen)
+        prior = log_prior_of_set(own, self._usual) + sum(map(self.functions.log_prior, (common, *alone)))
+        return SetNoise(terms, (), chosen, own, common, alone, prior)
 
     def _chosen(self, noise: NoiseModel) -> tuple[int, ...]:
         return noise.chosen if isinstance(noise, SetNoise) else self._white
@@ -294,11 +294,11 @@ class SetBoard(Board[SetEvidence]):
         d[: len(evidence.weight)] += evidence.weight * evidence.shift
         scale = 1.0 / np.sqrt(np.diag(A))
         L = np.linalg.cholesky(A * np.outer(scale, scale))
-        z = np.linalg.solve(L, d * scale)
+        z = solve_triangular(L, d * scale, lower=True)
         log_det = one.log_det + 2.0 * float(np.sum(np.log(np.diag(L)) - np.log(scale)))
         return 0.5 * (one.explained + float(z @ z) - log_det)
 
-    def _total(self, chosen: tuple[int, ...], columns: Ints) -> _Share:
+    def _total(self, chosen: tuple[int, ...], columns: Ints) -> Share:
         """Put together what all recordings say of the model's parameters and more columns, about the estimate."""
         # What is eliminated, and what stands for two parameters, is needed besides.
         more = [*self._varying.tolist(), *chain.from_iterable(self._own)]
@@ -306,45 +306,71 @@ class SetBoard(Board[SetEvidence]):
         place = {self._names[column]: k for k, column in enumerate(every.tolist())}
         J, d = np.zeros((len(every), len(every))), np.zeros(len(every))
         explained = log_det = 0.0
-        for group in self._groups:
-            at, one = self._of_power_on([self.rivals[k][chosen[k]] for k in group], place)
+        for number in range(len(self._groups)):
+            at, one = self._of_group(number, chosen, place)
             J[np.ix_(at, at)] += one.J
             d[at] += one.d
             explained, log_det = explained + one.explained, log_det + one.log_det
-        about = self._about(_Share(J, d, explained, log_det), place, len(columns))
-        return self._in_sizes(about, chosen[len(self.rivals) :], columns)
+        about = self._about(Share(J, d, explained, log_det), place, len(columns))
+        return self._in_sizes(about, self._layout.common(chosen), columns)
 
-    def _of_power_on(self, recordings: Sequence[InOneNoise], place: Mapping[str, int]) -> tuple[Ints, _Share]:
+    def _of_group(self, number: int, chosen: tuple[int, ...], place: Mapping[str, int]) -> tuple[Ints, Share]:
+        """Put together what a power-on says in a choice, kept while the parameters are the same."""
+        group, alone = self._groups[number], self._layout.own(chosen)
+        own = tuple(alone[k] if alone else () for k in group)
+        key = (number, tuple(chosen[k] for k in group), own, tuple(place))
+        if key not in self._kept:
+            if len(self._kept) >= _MOST_KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            noises = [self.rivals[k][chosen[k]] for k in group]
+            self._kept[key] = self._of_power_on(noises, [self.functions.own(sizes) for sizes in own], place)
+        return self._kept[key]
+
+    def _of_power_on(
+        self, recordings: Sequence[InOneNoise], functions: Sequence[OwnWeights], place: Mapping[str, int]
+    ) -> tuple[Ints, Share]:
         """Put together what the recordings of one power-on say of parameters.
+
+        Parameters
+        ----------
+        functions : sequence of OwnWeights
+            Of each recording alone.
 
         Returns
         -------
         at : ndarray of int, shape (w,)
             Places of those that these recordings know: of the thousands of a set a few hundred.
-        share : _Share
+        share : Share
             On them; what the power-on may differ by is eliminated.
         """
         parts = [one.places(place) for one in recordings]
         at = np.unique(np.concatenate([wanted for wanted, _ in parts]))
         J, d = np.zeros((len(at), len(at))), np.zeros(len(at))
-        for one, (wanted, own) in zip(recordings, parts, strict=True):
+        explained = log_det = 0.0
+        for k, (one, (wanted, own)) in enumerate(zip(recordings, parts, strict=True)):
             here = np.searchsorted(at, wanted)
-            J[np.ix_(here, here)] += one.J[np.ix_(own, own)]
-            d[here] += one.d[own]
-        explained, log_det = sum(one.explained for one in recordings), sum(one.log_det for one in recordings)
+            said = Share(one.J[np.ix_(own, own)], one.d[own], one.explained, one.log_det)
+            if functions[k].labels:
+                behind = {column: n for n, column in enumerate(wanted.tolist())}
+                said = beside_own(
+                    said, np.array([behind[place[label]] for label in functions[k].labels]), functions[k].size
+                )
+            J[np.ix_(here, here)] += said.J
+            d[here] += said.d
+            explained, log_det = explained + said.explained, log_det + said.log_det
         varying = np.array([place[self._names[column]] for column in self._varying.tolist()], dtype=np.int64)
         # A recording that has a value of its own does not know that of the others.
         known = np.isin(varying, at)
         v, tau = np.searchsorted(at, varying[known]), self._tau[known]
         if not len(v):
-            return at, _Share(J, d, explained, log_det)
+            return at, Share(J, d, explained, log_det)
         B, y = tau[:, None] * J[v], tau * d[v]
         M = np.eye(len(v)) + B[:, v] * tau
         X = np.linalg.solve(M, np.column_stack([B, y]))
         explained, log_det = explained + float(y @ X[:, -1]), log_det + float(np.linalg.slogdet(M)[1])
-        return at, _Share(J - B.T @ X[:, :-1], d - B.T @ X[:, -1], explained, log_det)
+        return at, Share(J - B.T @ X[:, :-1], d - B.T @ X[:, -1], explained, log_det)
 
-    def _about(self, one: _Share, place: Mapping[str, int], count: int) -> _Share:
+    def _about(self, one: Share, place: Mapping[str, int], count: int) -> Share:
         """Take the first parameters alone, about the estimate of the set, in the coordinates of its evidence."""
         J, d = one.J, one.d
         names = self._names
@@ -355,16 +381,36 @@ class SetBoard(Board[SetEvidence]):
         J, d, point = J[:count, :count], d[:count], np.zeros(count)
         point[: len(self.evidence.weight)] = -self.evidence.shift
         moved = J @ point
-        return _Share(J, d - moved, one.explained + float(2.0 * d @ point - point @ moved), one.log_det)
+        return Share(J, d - moved, one.explained + float(2.0 * d @ point - point @ moved), one.log_det)
 
-    def _in_sizes(self, one: _Share, sizes: Sequence[int], columns: Ints) -> _Share:
+    def _in_sizes(self, one: Share, sizes: Sequence[int], columns: Ints) -> Share:
         """Give the weights of the function the prior of some sizes; all of them are among the columns."""
         change = self.functions.change(sizes)
-        at = np.array([columns.tolist().index(k) for k in change.columns], dtype=np.int64)
+        place = {column: k for k, column in enumerate(columns.tolist())}
+        at = np.array([place[k] for k in change.columns.tolist()], dtype=np.int64)
         one.J[at, at] += change.more
         one.d[at] -= change.more * change.values
         squares = float(change.more @ change.values**2)
-        return _Share(one.J, one.d, one.explained - squares, one.log_det + change.log_det)
+        return Share(one.J, one.d, one.explained - squares, one.log_det + change.log_det)
+
+
+def beside_own(said: Share, at: Ints, size: Floats) -> Share:
+    """Integrate parameters that one recording has for itself: they add to those at some places.
+
+    Parameters
+    ----------
+    at : ndarray of int, shape (m,)
+        Places of the parameters to which they add.
+    size : ndarray, shape (m,)
+        One-sigma of each (SI).
+    """
+    B, y = size[:, None] * said.J[at], size * said.d[at]
+    M = np.eye(len(at)) + B[:, at] * size
+    L = np.linalg.cholesky(M)
+    X = solve_triangular(L, np.column_stack([B, y]), lower=True)
+    z, log_det = X[:, -1], 2.0 * float(np.log(np.diag(L)).sum())
+    X = X[:, :-1]
+    return Share(said.J - X.T @ X, said.d - X.T @ z, said.explained + float(z @ z), said.log_det + log_det)
 
 
 def _changed(chosen: tuple[int, ...], place: int, other: int) -> tuple[int, ...]:

@@ -28,9 +28,17 @@ from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import SetSearch, place_of, place_of_local, search_beside, search_set
-from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, sentence, verdict_of_set
-from sdimu_calibration.core.plain_text import first_of, listing
+from sdimu_calibration.core.joint.set_search import (
+    FunctionShare,
+    SetSearch,
+    place_of,
+    place_of_local,
+    search_beside,
+    search_set,
+)
+from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
+from sdimu_calibration.core.noise_term import unexplained
+from sdimu_calibration.core.plain_text import capital, first_of, listing
 from sdimu_calibration.core.plan_search import Question
 from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
@@ -48,7 +56,8 @@ class SetDiagnosis:
     """What was found in a set."""
 
     verdict: Verdict
-    sentence: str
+    statements: tuple[str, ...]
+    """The verdict for people: what was found by how sure it is, then what is left, and what comes back."""
     findings: tuple[SetFinding, ...]
     before: Calibration
     after: Calibration
@@ -70,10 +79,20 @@ class SetDiagnosis:
     probabilities: Probabilities | None = None
     """Of nothing, and of each family of effects in all recordings, at the end of the search; None where it did not come
     to an end."""
-    function: float | None = None
-    """Probability that an unknown function of the attitude is in all recordings; None where none was looked for."""
     unknown: tuple[UnknownFunction, ...] = ()
     """The function of the attitude that explains what is left, at all stops; empty without one."""
+    functions: tuple[FunctionShare, ...] = ()
+    """How probable such a function is in all recordings, then in each alone; empty where none was looked for."""
+
+    @property
+    def function(self) -> float | None:
+        """Probability that an unknown function of the attitude is in all recordings; None where none was looked for."""
+        return next((one.probability for one in self.functions if one.is_common), None)
+
+    @property
+    def sentence(self) -> str:
+        """The statements in one text."""
+        return " ".join(self.statements)
 
 
 def diagnose_set(
@@ -90,33 +109,28 @@ def diagnose_set(
     found = search_set(members, options, run, extra, progress, fitted=fitted)
     progress("report", 0.95)
     again = recurrence(leftovers(found.after, run))
-    before, facts = set_outcome(found.before), _facts(found, again)
-    refused: tuple[SetFinding, ...] = ()
-    why = ""
-    # An error of one recording, too, fits better with a function of the attitude in all of them than without any.
-    # Where attitudes come back and the error does not, recordings have functions of their own, which are noise of each.
-    shared = again is not None and not (again.answer or again.excludes_attitude or facts.is_of_some)
-    function: float | None = None
-    if again is not None and (shared or ATTITUDE in again.answer):
-        beside = with_function(found.after, again.sensors, run)
-        beside_it = search_beside(found, beside, options, run, extra, progress) if beside.function else found
-        function = beside_it.function if beside.function else None
-        if beside_it.function > PROBABLE:
-            found, earlier = beside_it, facts.findings
-            again = replace(again, sensors=found.with_function or again.sensors)
-            facts = _facts(found, again)
-            tags = {f.tag for f in facts.findings}
-            refused = tuple(f for f in earlier if f.tag not in tags)
-            why = _explained(again, found, [f.tag for f in refused])
+    before, without = set_outcome(found.before), found
+    beside = _beside_function(found, again, options, run, extra, progress)
+    functions = () if beside is None else beside.functions
+    if again is not None and beside is not None:
+        # What is of the attitude all rows tell; where kinds look the same they say nothing of the others.
+        common = functions[0]
+        again = again.judged(ATTITUDE, common.probability) if again.apart else again
+        if beside.any_function > PROBABLE:
+            found, again = beside, replace(again, sensors=common.sensors if common.likely else again.sensors)
+    facts = _facts(found, again)
+    tags = {f.tag for f in facts.findings}
+    refused = () if found is without else tuple(f for f in _findings(without) if f.tag not in tags)
+    why = _explained(again, found, [f.tag for f in refused]) if again is not None and found is not without else ()
     word = verdict_of_set(facts)
-    why = why if found.stood else f"{why} {TO_AND_FRO[0].upper()}{TO_AND_FRO[1:]}.".strip()
+    why = why if found.stood else (*why, f"{capital(TO_AND_FRO)}.")
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
     steps = next_steps(again, facts.beside_function)
     kept = [] if word == Verdict.UNEXPLAINED else _added(found, facts.findings)
     return SetDiagnosis(
         word,
-        f"{sentence(word, facts)} {why}".strip(),
+        (*statements(word, facts), *why),
         tuple(facts.findings),
         before,
         facts.after if found.stood else facts.after.warned(TO_AND_FRO),
@@ -128,9 +142,30 @@ def diagnose_set(
         refused,
         _error_without(found),
         facts.told,
-        function,
-        unknown_functions(found.after),
+        unknown_functions(found.after) if facts.beside_function else (),
+        functions,
     )
+
+
+def _beside_function(
+    found: SetSearch,
+    again: Recurrence | None,
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect],
+    progress: Progress,
+) -> SetSearch | None:
+    """Search again where an unknown function of the attitude may explain what is left; None where none can.
+
+    Some recording alone may have an error that follows the attitude, or what is left may come back with it.
+    """
+    if again is None:
+        return None
+    sensors = found.may_follow_attitude or (again.sensors if again.may_come_back(ATTITUDE) else ())
+    if not sensors:
+        return None
+    beside = with_function(found.after, sensors, run)
+    return search_beside(found, beside, options, run, extra, progress) if beside.function else None
 
 
 def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
@@ -138,18 +173,26 @@ def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
     after = set_outcome(found.after)
     after = averaged(after, found.after, found.posterior) if found.stood else after
     told = probabilities(found.posterior) if found.stood else None
-    return SetFacts(_findings(found), after, found.after, again, told)
+    # In a single rest nothing changes that a cause could follow.
+    moved = [(k, r) for k, r in enumerate(found.after.reports) if len(r.times.stops) > 1]
+    own = {r.name: unexplained(found.drawn_in(k), notes=r.notes) for k, r in moved}
+    drawn = {name: terms for name, terms in own.items() if terms}
+    likely = tuple(one for one in found.functions if one.likely)
+    return SetFacts(_findings(found), after, found.after, again, told, likely, drawn)
 
 
-def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> str:
+def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> tuple[str, ...]:
     """Say what an unknown function explains, and how likely it is; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
-    too = f" It also explains {', '.join(names)}: not told." if names else ""
+    too = (f"It also explains {', '.join(names)}: not told.",) if names else ()
+    common = next((one for one in found.functions if one.is_common and one.likely), None)
+    if common is None:
+        return too
     of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
     # Where the search went to and fro no probabilities are told.
-    share = f" ({in_percent(found.function)})" if found.stood else ""
+    share = f" ({in_percent(common.probability)})" if found.stood else ""
     where = f"{listing(again.sensors)}{share}"
-    return f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.{too}"
+    return (f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.", *too)
 
 
 def _error_without(found: SetSearch) -> float | None:

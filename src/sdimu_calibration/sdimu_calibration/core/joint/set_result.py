@@ -185,7 +185,9 @@ def _beside(fit: SetFit) -> list[str]:
     """Say beside which unknown function the coefficients were estimated, and how large it is."""
     if fit.function is None:
         return []
-    told = fit.function.told or fit.function.sensors
+    told = fit.function.sensors if fit.function.told is None else fit.function.told
+    if not told:
+        return []
     sizes = [f"{s} of {_size(s, v)}" for s, v in fit.function.size.items() if s in told]
     return [f"estimated beside an unknown function of the attitude in {listing(sizes)} that all recordings share"]
 

@@ -7,17 +7,18 @@ again in the next round, about the fit that has it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
-from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search, with_steps
+from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.diagnosis.search import CERTAIN_NOISE, FALSE_ALARM, Search, search, with_steps
 from sdimu_calibration.core.effects import selection
-from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.effect import CHANNELS, Effect
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
@@ -26,10 +27,12 @@ from sdimu_calibration.core.joint.changed import change_of, stable_effects, with
 from sdimu_calibration.core.joint.function_fit import in_size
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
-from sdimu_calibration.core.joint.set_board import SetBoard, SetNoise
+from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
+from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.joint.set_standing import set_standing
+from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
@@ -62,6 +65,27 @@ class LocalFind:
     def label(self) -> str:
         """Key with the name of the recording behind it."""
         return tagged(self.key, self.recording)
+
+
+@dataclass(frozen=True)
+class FunctionShare:
+    """How probable an unknown function of the attitude is."""
+
+    recording: str
+    """That which has it alone; empty where all share it."""
+    probability: float
+    sensors: tuple[str, ...]
+    """Those that more likely than not have it, else the likeliest one."""
+
+    @property
+    def is_common(self) -> bool:
+        """Whether all recordings share it."""
+        return not self.recording
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is more likely than not."""
+        return self.probability > PROBABLE
 
 
 @dataclass(frozen=True)
@@ -99,20 +123,62 @@ class SetSearch:
         return (*self.chosen, *(_of_one(one.label) for one in self.local))
 
     @property
-    def function(self) -> float:
-        """Probability that an unknown function of the attitude is in all recordings (1)."""
-        return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and any(noise.function))
+    def any_function(self) -> float:
+        """Probability of an unknown function of the attitude, in all recordings or in one (1)."""
+        return self._of_noise(lambda noise: any(noise.function) or any(map(any, noise.own_functions)))
 
-    @property
-    def with_function(self) -> tuple[str, ...]:
-        """Sensors that more likely than not have such a function."""
-        shared = self.after.function
-        window = self.posterior
+    @cached_property
+    def functions(self) -> tuple[FunctionShare, ...]:
+        """The function that all recordings share, and that of each alone; empty where none was looked for."""
+        if self.after.function is None:
+            return ()
+        own = [self._share(report.name, r) for r, report in enumerate(self.after.reports)]
+        return (self._share("", None), *own)
+
+    @cached_property
+    def may_follow_attitude(self) -> tuple[str, ...]:
+        """Sensors of which some recording may have an error that follows the attitude, as its noise."""
+
+        def has(noise: SetNoise, channel: str) -> bool:
+            terms = (t for one in noise.own for t in one.terms if t.kind == ATTITUDE)
+            return any(channel in {f"{t.triad}_{'xyz'[axis]}" for axis in t.axes} for t in terms)
+
+        def of(channel: str) -> float:
+            return self._of_noise(lambda noise: has(noise, channel))
+
+        return tuple(channel for channel in CHANNELS if of(channel) > NAMED)
+
+    def drawn_in(self, place: int) -> tuple[NoiseTerm, ...]:
+        """Noise that hangs on attitude, rate or turns, nearly certain in a recording, by its place among the reports.
+
+        What wanders and looks the same has its own probability.
+        """
+        of_each: dict[NoiseTerm, float] = {}
+        for noise, p in self.posterior.noises:
+            for term in noise.own[place].terms if isinstance(noise, SetNoise) else ():
+                if term.kind in DRAWN:
+                    of_each[term] = of_each.get(term, 0.0) + p
+
+        def certain(triad: str) -> bool:
+            return self._of_noise(lambda noise: bool(noise.own[place].drawn_in(triad))) > CERTAIN_NOISE
+
+        likely = [[term for term in of_each if term.triad == triad] for triad in TRIADS if certain(triad)]
+        return tuple(max(own, key=of_each.__getitem__) for own in likely)
+
+    def _share(self, recording: str, place: int | None) -> FunctionShare:
+        """Say how probable the function of a recording is, by its place among the reports; None: that of all."""
+        sensors = () if self.after.function is None else self.after.function.sensors
 
         def of(k: int) -> float:
-            return window.of_any_noise(lambda noise: isinstance(noise, SetNoise) and noise.function[k : k + 1] > (0,))
+            return self._of_noise(lambda noise: bool(noise.sizes_of(place)[k]))
 
-        return () if shared is None else tuple(s for k, s in enumerate(shared.sensors) if of(k) > PROBABLE)
+        each = [of(k) for k in range(len(sensors))]
+        likely = tuple(s for s, p in zip(sensors, each, strict=True) if p > PROBABLE)
+        together = self._of_noise(lambda noise: any(noise.sizes_of(place)))
+        return FunctionShare(recording, together, likely or (sensors[int(np.argmax(each))],))
+
+    def _of_noise(self, holds: Callable[[SetNoise], bool]) -> float:
+        return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and holds(noise))
 
 
 def search_set(
@@ -158,7 +224,8 @@ def search_beside(
     again = _searched(found.before, fit, found.told, options, run, extra, progress)
     shared = again.after.function
     if shared is not None:
-        again = replace(again, after=replace(again.after, function=replace(shared, told=again.with_function)))
+        told = tuple(s for one in again.functions if one.is_common and one.likely for s in one.sensors)
+        again = replace(again, after=replace(again.after, function=replace(shared, told=told)))
     return replace(again, first=found.first, threshold=found.threshold)
 
 

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
 from sdimu_calibration.core.diagnosis.found import DECIDED
-from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, in_grades, named, size, without_variant
-from sdimu_calibration.core.diagnosis.verdict import Facts, nothing_missing, something_missing, verdict
-from sdimu_calibration.core.estimation.navigation_fit import MISFIT
+from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, each_grade, named, size, without_variant
+from sdimu_calibration.core.diagnosis.verdict import IF_NONE, Facts, nothing_missing, something_missing, verdict
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit
-from sdimu_calibration.core.joint.set_result import MANY, SCATTERS, worst_figure
-from sdimu_calibration.core.noise_term import may_be_an_effect
+from sdimu_calibration.core.joint.set_result import MANY, SCATTERS
+from sdimu_calibration.core.joint.set_search import FunctionShare
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
-from sdimu_calibration.core.plain_text import first_of
+from sdimu_calibration.core.plain_text import first_of, listing
 from sdimu_calibration.core.posterior.told import Probabilities, Share
+from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 
@@ -77,21 +78,15 @@ class SetFacts:
     told: Probabilities | None
     """None where the search did not come to an end."""
 
+    functions: Sequence[FunctionShare] = ()
+    """Likely functions of the attitude, of all recordings or of one."""
+    drawn: Mapping[str, tuple[NoiseTerm, ...]] = field(default_factory=dict)
+    """Noise that no sensor has by itself, nearly certain, by the recording."""
+
     @property
     def beside_function(self) -> bool:
-        """Whether an unknown function of the attitude explains what is left."""
-        return self.fit.function is not None
-
-    @property
-    def is_of_some(self) -> bool:
-        """Whether some recordings have large errors that noise takes in, and others small ones and no noise.
-
-        A recording of one stop does not count: nothing that changes with attitude or rate changes in it.
-        """
-        reports = [r for r in self.fit.reports if len(r.times.stops) > 1]
-        loud = [r.noise for r in reports if worst_figure(r) > MISFIT]
-        quiet = [r.noise for r in reports if worst_figure(r) <= MISFIT]
-        return any(map(may_be_an_effect, loud)) and any(not noise for noise in quiet)
+        """Whether an unknown function of the attitude, the same in all recordings, explains what is left."""
+        return any(one.is_common for one in self.functions)
 
     @property
     def comes_back(self) -> bool:
@@ -104,7 +99,7 @@ def verdict_of_set(facts: SetFacts) -> Verdict:
     findings, error = facts.findings, facts.after.fit["held_out_rms"]
     shared = [(f.label, f.alike) for f in findings if not f.recording]
     still = error is not None and error > STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
-    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back or facts.is_of_some
+    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back or bool(facts.functions or facts.drawn)
     # A fault leaves traces in its recording that are no physics of the unit.
     unexplained = facts.beside_function or (left and (bool(shared) or not findings))
     # A search that came to no end says that something is missing.
@@ -121,37 +116,59 @@ def _scatter(result: Calibration) -> float:
     return float(min(1.0, len(seen) * seen.min())) if len(seen) else 1.0
 
 
-def sentence(word: Verdict, facts: SetFacts) -> str:
-    """Say what was found, then what comes back of that what the model leaves."""
+def statements(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
+    """Say what was found, a statement a grade, then what each recording has, and what comes back."""
     again = facts.again
     # Beside a function that explains what is left, stops that do not come back are too few, and say nothing.
     tells = again is not None and (not facts.beside_function or facts.comes_back)
-    more = answer_in_words(again, word == Verdict.UNEXPLAINED) if again is not None and tells else ""
-    return f"{_found(word, facts)} {more}".strip()
+    more = (answer_in_words(again, word == Verdict.UNEXPLAINED),) if again is not None and tells else ()
+    return (*_found(word, facts), *more)
 
 
-def _found(word: Verdict, facts: SetFacts) -> str:
+def _found(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
     findings, told = facts.findings, facts.told
     if word == Verdict.CLASS_OF_EFFECTS and not findings and told is not None:
-        return something_missing(told)
+        return (something_missing(told),)
     if word == Verdict.CONSISTENT:
         how = "nothing stands out of the noise" if facts.again is None else "each in a noise of its own"
         mark = ":" if facts.again is None else ","
-        return f"The model explains all recordings together{mark} {how}{nothing_missing(told)}."
-    if word in {Verdict.DATA_FAULT, Verdict.UNEXPLAINED}:
-        names = " and ".join(map(_named, findings[:LISTED]))
-        names += f" and {len(findings) - LISTED} more" if len(findings) > LISTED else ""
-        changed = [f for f in findings if f.against or is_change(f.label)]
-        if word == Verdict.DATA_FAULT and len(changed) > MANY:
-            return _many_changed(changed)
-        if word == Verdict.DATA_FAULT:
-            return f"All recordings agree but for {names}."
-        most = f" Found beside it: {in_grades(list(map(_graded, findings)))}" if findings else ""
-        odd = "" if facts.beside_function else _odd(facts.after)
+        return (f"The model explains all recordings together{mark} {how}{nothing_missing(told)}.",)
+    if word == Verdict.DATA_FAULT:
+        return (_of_recordings(findings),)
+    every = each_grade(list(map(_graded, findings))) if findings else ()
+    if word == Verdict.UNEXPLAINED:
+        odd = () if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
         what = "The recordings share something" if shared else "Something differs between the recordings"
-        return f"{what} that no effect of the catalogue explains.{most}{odd}"
-    return in_grades(list(map(_graded, findings)))
+        beside = ("Found beside it:", *every) if every else ()
+        return (f"{what} that no effect of the catalogue explains.", *beside, *odd, *_of_each(facts))
+    return every
+
+
+def _of_recordings(findings: Sequence[SetFinding]) -> str:
+    """Say what single recordings have, where nothing of the unit is missing."""
+    changed = [f for f in findings if f.against or is_change(f.label)]
+    if len(changed) > MANY:
+        return _many_changed(changed)
+    return f"All recordings agree but for {_some([_named(f) for f in findings])}."
+
+
+def _of_each(facts: SetFacts) -> tuple[str, ...]:
+    """Say what recordings have each for itself: a function of the attitude, or noise that no sensor has by itself."""
+    own = [one for one in facts.functions if not one.is_common]
+    alone = [f"{one.recording} ({', '.join(one.sensors)}, {in_percent(one.probability)})" for one in own]
+    words: dict[str, list[str]] = {}
+    for name, terms in facts.drawn.items():
+        for term in terms:
+            words.setdefault(term.words, []).append(name)
+    drawn = [f"{what} in {_some(names)}" for what, names in words.items()]
+    told = [f"An error that follows the attitude, another one in each, is in {_some(alone)}."] if alone else []
+    return (*told, *([f"What is left looks like {_some(drawn)}; the sigmas count it {IF_NONE}."] if drawn else []))
+
+
+def _some(names: Sequence[str]) -> str:
+    """Name some, and how many more there are."""
+    return listing(names) if len(names) <= LISTED else f"{', '.join(names[:LISTED])} and {len(names) - LISTED} more"
 
 
 def _graded(f: SetFinding) -> Graded:
@@ -183,6 +200,6 @@ def _named(f: SetFinding) -> str:
     return f"{named(f.label)} ({size(f.value, f.sigma, f.display_unit)}){where}"
 
 
-def _odd(result: Calibration) -> str:
+def _odd(result: Calibration) -> tuple[str, ...]:
     lines = without_advice(line for line in result.warnings if topic_of(line) == Topic.DIFFERS)
-    return f" {lines[0]}." if lines else ""
+    return tuple(f"{line}." for line in lines[:1])

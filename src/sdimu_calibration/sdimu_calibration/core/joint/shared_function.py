@@ -39,8 +39,8 @@ class SharedFunction:
     """Direction of the force in b (1) at the stops of the recordings, shape (n, 3)."""
     size: Mapping[str, float]
     """One-sigma of the weights of a sensor (rad/s, m/s^2); empty where nobody knows it yet."""
-    told: tuple[str, ...] = ()
-    """Sensors that more likely than not have them; empty where none was weighed yet."""
+    told: tuple[str, ...] | None = None
+    """Sensors that more likely than not have them; None where this was not weighed yet."""
 
     @property
     def labels(self) -> tuple[str, ...]:

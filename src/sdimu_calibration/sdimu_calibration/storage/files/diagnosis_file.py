@@ -314,6 +314,7 @@ class SetDiagnosisFile(ResultModel):
     threshold: Number = np.nan
     probabilities: Row = None
     function: Number | None = None
+    functions: Rows = ()
     findings: Rows = ()
     refused: tuple[Line, ...] = ()
     held_out_before: Number = np.nan
@@ -338,6 +339,7 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         threshold=found.threshold,
         probabilities=odds(found.probabilities),
         function=found.function,
+        functions=[asdict(one) | {"sensors": list(one.sensors)} for one in found.functions],
         findings=[asdict(f) | {"alike": list(f.alike), "may_be": _shares(f.may_be)} for f in found.findings],
         refused=[f.label for f in found.refused],
         held_out_before=found.error_without,
