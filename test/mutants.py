@@ -102,6 +102,27 @@ MUTANTS = (
         "    explained += float(2.0 * d @ point",
         (f"{TESTS}/joint/test_set_board.py",),
     ),
+    Mutant(
+        "joint/set_board.py",
+        "log_det + float(np.linalg.slogdet(M)[1])",
+        "log_det",
+        (f"{TESTS}/joint/test_set_board.py",),
+    ),
+    Mutant("joint/set_board.py", "            d[shared] += d[own]\n", "", (f"{TESTS}/joint/test_set_board.py",)),
+    Mutant(
+        "evidence/linear.py",
+        "        e = fresh.e - self.W[:, places]",
+        "        e = fresh.e + self.W[:, places]",
+        (f"{TESTS}/evidence/test_linear.py",),
+    ),
+    Mutant("evidence/linear.py", "weighed.T @ self.e", "W.T @ self.e", (f"{TESTS}/evidence/test_linear.py",)),
+    Mutant("posterior/models.py", " & ~prior.own & ", " & ", (f"{TESTS}/posterior/test_models.py",)),
+    Mutant(
+        "batch/batch.py",
+        "    point = LinearisationPoint(coefficients, np.repeat",
+        "    point = LinearisationPoint(0.0 * coefficients, np.repeat",
+        (f"{TESTS}/batch/test_batch.py",),
+    ),
     Mutant("earth.py", "linear * height + 3.0", "linear * height - 3.0", (f"{TESTS}/test_earth.py",)),
 )
 

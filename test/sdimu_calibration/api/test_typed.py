@@ -38,7 +38,9 @@ TOLD = {
 def strict(folder: Path, script: str) -> list[str]:
     """Lines that mypy says of a script."""
     (folder / "script.py").write_text(script)
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--cache-dir", folder / "cache", "script.py"]
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file=", "--cache-dir", folder / "cache"]
+    # As mypy treats an installed package: what its functions do inside is the package's own affair (make check-types).
+    command += ["--follow-imports=silent", "script.py"]
     paths = os.pathsep.join(str(SOURCES / name) for name in ("sdimu_calibration", "sdimu_sim", "rate_table_sim"))
     done = subprocess.run(
         command, cwd=folder, env={**os.environ, "MYPYPATH": paths}, capture_output=True, text=True, check=False

@@ -45,12 +45,12 @@ def general_attitude():
     return rotation_matrix(np.array([0.7, -1.1, 1.9]))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def site() -> Site:
     return Site(latitude_rad=np.radians(36.4), height_m=80.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def imu() -> ImuSpecification:
     """The specification of Kim, Song & Lyou."""
     return ImuSpecification(
@@ -69,7 +69,7 @@ def imu() -> ImuSpecification:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def model() -> Model:
     return Model(BASELINE)
 

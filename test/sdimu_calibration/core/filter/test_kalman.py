@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from sdimu_calibration.core.filter.kalman import cholesky, propagate, update, whiten
+from sdimu_calibration.core.filter.kalman import cholesky, predict, propagate, update, whiten
 
 
 def spd(rng, n):
@@ -32,7 +32,12 @@ def test_update_is_conditioning_of_the_joint_gaussian(seed):
     gain = np.linalg.solve(cov[n:, n:], cov[n:, :n]).T
     mean, left = x + gain @ (z - H @ x), cov[:n, :n] - gain @ cov[n:, :n]
     got_x, got_P = x.copy(), P.copy()
+    ahead, spread = predict(got_x, got_P, z, H, R, M)
+    np.testing.assert_array_equal(got_x, x)
+    np.testing.assert_array_equal(got_P, P)
     innovation, L, K = update(got_x, got_P, z, H, R, M)
+    np.testing.assert_allclose(ahead, innovation, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(spread, L, rtol=1e-9, atol=1e-10 * np.abs(L).max())
     np.testing.assert_allclose(innovation, z - H @ x, rtol=0, atol=1e-13)
     np.testing.assert_allclose(L @ L.T, cov[n:, n:], rtol=1e-10, atol=1e-10 * np.abs(cov[n:, n:]).max())
     np.testing.assert_allclose(K, gain, rtol=1e-7, atol=1e-9 * np.abs(gain).max())

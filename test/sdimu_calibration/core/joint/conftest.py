@@ -43,7 +43,7 @@ class UnitSet:
     truth: Mapping[str, float]
 
 
-def short(name: str = "recommended", stops: int = 20, dwell_s: float = 30.0) -> Plan:
+def short(name: str = "recommended", stops: int = 14, dwell_s: float = 30.0) -> Plan:
     plan = load_plan(name)
     stops = min(stops, len(plan.dwell_s))
     return replace(plan, dwell_s=(dwell_s,) * stops, turns=plan.turns[: stops - 1])

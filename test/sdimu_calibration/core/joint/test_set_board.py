@@ -15,7 +15,7 @@ from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.rival_noises import rival_noises
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import set_evidence
-from sdimu_calibration.core.joint.set_fit import asked_again, fit_set, with_reports
+from sdimu_calibration.core.joint.set_fit import SetOptions, asked_again, fit_set, with_reports
 from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -61,8 +61,8 @@ def full(options):
     return with_reports(fit, asked_again(fit, here, candidates=(RAMP,), rivals=True))
 
 
-def board_of(fit):
-    evidence = set_evidence(fit, split(resolve(RAMP)))
+def board_of(fit, candidate=RAMP):
+    evidence = set_evidence(fit, split(resolve(candidate)))
     return SetBoard(fit, {}, evidence, np.array([len(evidence.weight)]), frozenset(), None)
 
 
@@ -88,3 +88,51 @@ def test_the_noise_of_each_recording_is_chosen_beside_those_of_the_others(full):
     assert score == pytest.approx(offset + data.at(()).score)
     assert score > board.data(NoiseModel())[0] + 20.0
     assert all(score >= other for other, _ in ranked)
+
+
+@pytest.fixture(scope="module")
+def with_own_value(options):
+    """A fit whose last recording has its own value of an effect that all have, and the noises of all."""
+    members = unit_set(35, [short(stops=8)] * 3, (f"{RAMP}=10 deg/h/h",), noise=WALK).members
+    model = replace(options.model, effects=(*options.model.effects, RAMP))
+    wanted = SetOptions(model, local={"r2": (RAMP,)}, scopes={"gyro_bias_ramp": "unit"})
+    fit = fit_set(members, wanted, here)
+    return with_reports(fit, asked_again(fit, here, candidates=("accel_quadratic_x",), rivals=True))
+
+
+def dense_likelihood(board, chosen):
+    """Log likelihood of the model about zero, what differs from power-on to power-on as parameters of its own."""
+    evidence, known = board.evidence, board.known
+    first = len(known)
+    weight = np.concatenate([evidence.weight, np.ones(len(board.rivals) * len(board._tau))])
+    A, D, rest = np.diag(weight), np.zeros(len(weight)), 0.0
+    for number, (rivals, place) in enumerate(zip(board.rivals, chosen, strict=True)):
+        one = rivals[place]
+        S = np.zeros((len(one.names), len(weight)))
+        for row, name in enumerate(one.names):
+            if name not in known:
+                continue
+            S[row, known.index(name)] = 1.0
+            # The evidence has the value of one recording as its difference from that of all.
+            shared = name.partition("@")[0]
+            S[row, known.index(shared)] = 1.0
+            for k, column in enumerate(board._varying):
+                if known[column] == name:
+                    S[row, first + number * len(board._tau) + k] = board._tau[k]
+        J, d = one.J[np.ix_(one.columns, one.columns)], one.d[one.columns]
+        A, D, rest = A + S.T @ J @ S, D + S.T @ d, rest + one.explained - one.log_det
+    unit = 1.0 / np.sqrt(np.diag(A))
+    A = A * np.outer(unit, unit)
+    log_det = np.linalg.slogdet(A)[1] - 2.0 * np.sum(np.log(unit))
+    return 0.5 * (rest + (D * unit) @ np.linalg.solve(A, D * unit) - log_det)
+
+
+def test_a_noise_of_a_set_is_as_likely_as_all_its_parameters_at_once_say(with_own_value):
+    board = board_of(with_own_value, "accel_quadratic_x")
+    assert f"{RAMP}@r2" in board.known
+    assert (board._tau > 0.0).any()
+    white = dense_likelihood(board, board._white)
+    noises = [noise for _, noise in board.noises(()) if isinstance(noise, SetNoise) and noise.chosen != board._white]
+    assert noises
+    for noise in noises:
+        assert board.likelihood(noise) == pytest.approx(dense_likelihood(board, noise.chosen) - white, rel=1e-8)

@@ -116,7 +116,7 @@ def test_several_units_are_no_set(options):
 
 
 def test_a_coefficient_that_changed_in_one_recording_is_pointed_out(options):
-    some = unit_set(13, [short()] * 4, shift={2: {"gyro_scale_z": 20e-6}})
+    some = unit_set(13, [short(stops=20)] * 4, shift={2: {"gyro_scale_z": 20e-6}})
     varied = variation(fit_set(some.members, options, here))
     k = varied.names.index("gyro_scale_z")
     assert np.argmax(np.abs(varied.z[:, k])) == 2

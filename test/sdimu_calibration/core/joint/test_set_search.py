@@ -29,11 +29,11 @@ from sdimu_calibration.storage.files.config import load_model
 
 from .conftest import here, short, unit_set
 
-ASYMMETRY = "gyro_scale_asymmetry_y=3 ppm"
+ASYMMETRY = "gyro_scale_asymmetry_y=4 ppm"
 
 
 def test_a_weak_effect_is_found_in_all_recordings_together(options):
-    some = unit_set(31, [short(stops=26)] * 6, (ASYMMETRY,))
+    some = unit_set(31, [short(stops=26)] * 3, (ASYMMETRY,))
     alone = climb(solve(some.members[0].open(), load_model("baseline")))
     found = diagnose_set(some.members, options, here)
     assert not alone.chosen
@@ -73,8 +73,8 @@ def of(found, name):
 @pytest.fixture(scope="module")
 def both(options):
     """What is found where all recordings have a ramp, and one has more of it."""
-    some = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=0.25 deg/h/h",))
-    more = unit_set(34, [short()] * 3, ("gyro_bias_ramp_x=1.2 deg/h/h",))
+    some = unit_set(34, [short(stops=20)] * 3, ("gyro_bias_ramp_x=0.25 deg/h/h",))
+    more = unit_set(34, [short(stops=20)] * 3, ("gyro_bias_ramp_x=1.2 deg/h/h",))
     return search_set((*some.members[:2], more.members[2]), options, here)
 
 
@@ -170,7 +170,7 @@ def test_one_recording_is_no_set_to_diagnose(options):
 def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
     """One rate leaves asymmetry and quadratic term open; advised is another rate about the same axis."""
     strong = ("gyro_scale_asymmetry_y=40 ppm",)
-    plan = short("kim18_signed")
+    plan = short("kim18_signed", stops=20)
     two = unit_set(34, [plan, plan], strong)
     found = diagnose_set(two.members, options, here)
     assert found.verdict == "class of effects"

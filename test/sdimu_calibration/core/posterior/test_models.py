@@ -227,3 +227,30 @@ def test_a_member_that_cannot_be_negative_stands_beside_what_leaves_it_positive(
             assert stands[k, width] == is_one
             seen.add(is_one)
     assert seen == {True, False}
+
+
+def test_two_that_come_at_once_are_no_equations():
+    """Two of them explain any curve: each may come alone, and never as one of a pair."""
+    rng = np.random.default_rng(13)
+    own = np.array([False, False, False, True, True, False])
+    known, W = prior(6, own=own), drawn(6, rng)
+    data = data_of(W, 9.0 * (W[:, 3] - W[:, 4]) + rng.standard_normal(ROWS), known)
+    best = max(
+        data.at(((i, width), (j, width))).score
+        for i, j in itertools.combinations(np.flatnonzero(~own).tolist(), 2)
+        for width in range(len(WIDTHS))
+    )
+    score, members = data.at(()).paired()
+    assert score == pytest.approx(best, abs=1e-9)
+    assert not own[[k for k, _ in members]].any()
+
+
+def test_two_are_not_replaced_where_what_stays_would_turn_negative():
+    rng = np.random.default_rng(14)
+    W = drawn(5, rng)
+    known = prior(5, positive=np.array([True, False, False, False, False]))
+    data = data_of(W, 2.0 * W[:, 0] - 6.0 * W[:, 1] + 3.0 * W[:, 3] + 0.1 * rng.standard_normal(ROWS), known)
+    here = data.at(((0, 1), (1, 1), (3, 1)))
+    assert np.isfinite(here.score)
+    assert data.at(((0, 1),)).score == -np.inf
+    assert [others for others, _ in here.mergers()] == [((3, 1),), ((1, 1),)]
