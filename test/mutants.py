@@ -95,7 +95,7 @@ MUTANTS = (
         "        var_u = np.sum(inverse**2, axis=2) - np",
         (f"{TESTS}/joint",),
     ),
-    Mutant("joint/set_board.py", "_Share(J - B.T @ X", "_Share(J + B.T @ X", (f"{TESTS}/joint/test_set_board.py",)),
+    Mutant("joint/set_board.py", " Share(J - B.T @ X", " Share(J + B.T @ X", (f"{TESTS}/joint/test_set_board.py",)),
     Mutant(
         "joint/rival_noises.py",
         "    explained -= float(2.0 * d @ point",
