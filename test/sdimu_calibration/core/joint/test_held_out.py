@@ -71,7 +71,8 @@ def test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_h
     assert found.before.fit["held_out_rms"] < 0.5 * found.error_without
     assert found.error_without > 1.5 * with_it
     # The sentence is of the effects: an error near 1 may stand beside a coefficient that is far off.
-    assert found.sentence == first_screen.of_set(found).head.replace("\N{PLUS-MINUS SIGN}", "+-")
+    shown = re.sub("<[^>]+>", "", first_screen.of_set(found).head)
+    assert found.sentence == shown.replace("\N{PLUS-MINUS SIGN}", "+-").replace("\u00a0", " ")
     assert not re.search(r"held out|->", found.sentence)
     assert first_screen.of_set(found).costs[-1][0].startswith(f"{found.error_without:.2f} ")
 

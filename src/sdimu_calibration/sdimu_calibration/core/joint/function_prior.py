@@ -26,7 +26,7 @@ _RATIO = 2.0
 _NONE = 1e-3
 """Ratio of a size that is as good as none to that of the fit (1): a millionth of its variance."""
 OF_FIT = 1 + int(np.flatnonzero(_STEPS == 0.0)[0])
-"""Place of the size of the fit among those of a sensor: the first is none."""
+"""Place of the size of the fit among those of a sensor (1): the first is none."""
 
 
 @dataclass(frozen=True)

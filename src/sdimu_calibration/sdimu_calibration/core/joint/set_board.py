@@ -41,7 +41,17 @@ alone, which each recording knows well."""
 
 @dataclass(frozen=True)
 class Share:
-    """What some recordings say in their noises; attributes as of `InOneNoise`, the parameters those of the set."""
+    """What some recordings say in their noises, of parameters of the set.
+
+    Attributes
+    ----------
+    J : ndarray, shape (k, k)
+        Information on them (1/SI^2).
+    d : ndarray, shape (k,)
+        With all of them at zero (1/SI).
+    explained, log_det : float
+        As of `InOneNoise` (1).
+    """
 
     J: Floats
     d: Floats
