@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import FrameType
@@ -88,13 +89,8 @@ class Verbs(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
         """Load a verb; None when there is none of that name."""
-        module, _, attribute = (_VERBS.get(cmd_name) or _added().get(cmd_name, "")).partition(":")
-        if not module:
-            return None
-        try:
-            return _command(cmd_name, getattr(import_module(module), attribute))
-        except ImportError as error:
-            return _command(cmd_name, _unavailable(cmd_name, error))
+        place = _VERBS.get(cmd_name) or _added().get(cmd_name, "")
+        return _loaded(cmd_name, place) if place else None
 
 
 app = typer.Typer(
@@ -173,6 +169,16 @@ def _complain(text: str) -> int:
 def _added() -> dict[str, str]:
     """Verbs of other packages, by name, as ``module:attribute``."""
     return {point.name: point.value for point in entry_points(group=ENTRY_POINTS)}
+
+
+@cache
+def _loaded(name: str, place: str) -> Any:
+    """Make the command of a verb of ``module:attribute``, once: a command line asks for it twice."""
+    module, _, attribute = place.partition(":")
+    try:
+        return _command(name, getattr(import_module(module), attribute))
+    except ImportError as error:
+        return _command(name, _unavailable(name, error))
 
 
 def _unavailable(name: str, error: ImportError) -> Callable[[], None]:

@@ -6,9 +6,9 @@ import gc
 
 from sdimu_calibration.loading import ending_at_once
 
-_SELDOM = (50_000, 20, 50)
-"""Number of new objects between searches for garbage, and of searches among older ones: while a thousand modules load
-nothing is garbage, and Python's own (700, 10, 10) spend 5 to 10 % of a calibration on it."""
+_SELDOM = (250_000, 20, 50)
+"""Number of new objects between searches for garbage, and of searches among older ones: what loads and makes a
+diagnosis are 220,000, of which a thousand are garbage, and Python's own (700, 10, 10) spend 5 to 10 % on it."""
 
 
 def sdimu() -> None:

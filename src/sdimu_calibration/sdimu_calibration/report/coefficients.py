@@ -18,7 +18,7 @@ from sdimu_calibration.report import table
 from sdimu_calibration.report.drawing import AFTER, Figure, lay_out, literal
 from sdimu_calibration.report.effect_words import effect_of_key, tip, title_of
 from sdimu_calibration.report.figures import sigma_history
-from sdimu_calibration.report.groups import is_free
+from sdimu_calibration.report.groups import free
 from sdimu_calibration.report.markup import Draw, folded, quiet, section
 from sdimu_calibration.report.sections import separation
 from sdimu_calibration.report.statistics_section import influence_part
@@ -132,7 +132,8 @@ def _triad(key: str) -> str:
 
 def prior_and_posterior(calibration: Calibration, prior: Mapping[str, float]) -> Figure:
     """Estimate and sigma of each coefficient in sigmas of its prior; the band is the prior."""
-    shown = [k for k, name in enumerate(calibration.names) if prior.get(name, 0.0) > 0.0 and is_free(calibration, k)]
+    known = np.array([prior.get(name, 0.0) > 0.0 for name in calibration.names], dtype=bool)
+    shown = np.flatnonzero(known & free(calibration)).tolist()
     names = [calibration.names[k] for k in shown]
     size = np.array([prior[name] for name in names])
     sigma: Floats = np.sqrt(np.diag(calibration.covariance))[shown] / size

@@ -15,7 +15,7 @@ from sdimu_calibration.core.evidence.handheld_evidence import CHANNELS as HANDHE
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.groups import is_free
+from sdimu_calibration.report.groups import free
 
 CHANNEL_UNITS = ("mm",) * 3 + ("mm/s",) * 3 + ("deg/h",) * 3 + ("ug",) * 3
 """Customary unit of each measurement channel."""
@@ -323,10 +323,10 @@ def interrupted(x: Floats, y: Floats, gap: float) -> tuple[Floats, Floats]:
 
 def correlation(calibration: Calibration) -> tuple[tuple[str, ...], Floats]:
     """Names of the free coefficients and their correlation matrix."""
-    free = np.array([i for i in range(len(calibration.names)) if is_free(calibration, i)], dtype=np.int64)
-    C = calibration.covariance[np.ix_(free, free)]
+    shown = np.flatnonzero(free(calibration))
+    C = calibration.covariance[np.ix_(shown, shown)]
     scale = 1.0 / np.sqrt(np.diag(C))
-    return tuple(calibration.names[i] for i in free), C * np.outer(scale, scale)
+    return tuple(calibration.names[i] for i in shown), C * np.outer(scale, scale)
 
 
 def hardest_pairs(names: tuple[str, ...], C: Floats, most: int = 6, least: float = 0.5) -> list[tuple[str, str, float]]:

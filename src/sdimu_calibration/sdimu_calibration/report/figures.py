@@ -9,7 +9,7 @@ from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.palette import SERIES
 from sdimu_calibration.report.drawing import Figure, lay_out, literal
-from sdimu_calibration.report.groups import groups, is_free, short_name, title
+from sdimu_calibration.report.groups import free, groups, short_name, title
 
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 _COLUMNS = 2
@@ -53,12 +53,12 @@ def _draw(
     figure: Figure, calibration: Calibration, effect: str, indices: list[int], kept: Ints, place: dict[str, int]
 ) -> list[tuple[str, Floats, str]]:
     """Draw the lines of one panel; return label, sigmas and ink of each."""
-    history = calibration.history
+    history, is_free = calibration.history, free(calibration)
     drawn = []
     for order, index in enumerate(indices):
         unit = calibration.display_units[index]
         sigma = history.sigma[kept, index] * from_si(1.0, unit)
-        if not is_free(calibration, index):
+        if not is_free[index]:
             continue
         sigma, ink = np.where(sigma > 0, sigma, np.nan), SERIES[order % 6]
         drawn.append((literal(short_name(calibration.names[index], effect)), sigma, ink))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.results import Calibration
 
@@ -31,8 +32,15 @@ def title(effect: str) -> str:
     return effect.replace("_", " ")
 
 
-def is_free(calibration: Calibration, index: int) -> bool:
-    """Tell an estimated coefficient from one that the body frame makes zero by definition."""
+def free(calibration: Calibration) -> Bools:
+    """Tell estimated coefficients from those that the body frame makes zero by definition.
+
+    Returns
+    -------
+    ndarray of bool, shape (p,)
+    """
     sigma = np.sqrt(np.diag(calibration.covariance))
-    own = groups(calibration.names, calibration.model)[effect_of(calibration.names[index], calibration.model)]
-    return bool(sigma[index] > _FRAME_SHARE * sigma[own].max())
+    out = np.zeros(len(sigma), dtype=bool)
+    for own in groups(calibration.names, calibration.model).values():
+        out[own] = sigma[own] > _FRAME_SHARE * sigma[own].max()
+    return out

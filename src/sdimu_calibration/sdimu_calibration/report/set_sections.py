@@ -11,7 +11,7 @@ from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.evidence_figures import deviates
-from sdimu_calibration.report.groups import is_free
+from sdimu_calibration.report.groups import free
 from sdimu_calibration.report.markup import Draw, grid, quiet, section
 from sdimu_calibration.report.table import with_sigma
 
@@ -56,7 +56,7 @@ def _line(r: SetRecording) -> list[str]:
 
 
 def _deviates(calibration: Calibration, of_set: SetSummary, draw: Draw) -> str:
-    shown = [k for k in range(len(calibration.names)) if is_free(calibration, k)]
+    shown = np.flatnonzero(free(calibration)).tolist()
     value = np.array([r.deviate[shown] for r in of_set.recordings]).T
     figure = deviates(
         [r.name for r in of_set.recordings],

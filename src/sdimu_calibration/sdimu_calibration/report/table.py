@@ -15,7 +15,7 @@ from rich.table import Table
 from sdimu_calibration.core.effect_key import effect_of
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.groups import is_free
+from sdimu_calibration.report.groups import free
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ def rows(
     """
     sigmas = np.sqrt(np.diag(calibration.covariance))
     found = [
-        _row(calibration, index, float(sigma) if is_free(calibration, index) else 0.0, truth or {}, reference or {})
-        for index, sigma in enumerate(sigmas)
+        _row(calibration, index, float(sigma), truth or {}, reference or {})
+        for index, sigma in enumerate(np.where(free(calibration), sigmas, 0.0))
     ]
     known = prior or {}
     return [replace(row, prior=from_si(known[row.name], row.unit)) if row.name in known else row for row in found]
