@@ -115,3 +115,12 @@ def test_a_disturbed_line_is_rough_at_rest_and_in_a_steady_turn(size):
     assert {fault.text.split(" is ")[0] for fault in faults} == {"gyro z", "accelerometer y"}
     assert np.abs(t[t < 1000.0] - 505.0).max() < 6.0
     assert np.abs(t[t > 1000.0] - 1505.0).max() < 6.0
+
+
+def test_one_wild_reading_does_not_make_a_channel_noiseless():
+    rng = np.random.default_rng(8)
+    given = recording(rng, np.zeros((N, 1)))
+    given.omega_ib_b[5000, 0] = 1e30
+    left, faults = sound(given)
+    assert "spike" in {fault.kind for fault in faults}
+    assert len(left.t) == N - 1

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.data.static_detection import detect_static
+from sdimu_calibration.core.data.windows import block_means
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 from sdimu_sim.core.by_hand import ByHand, by_hand_motion, by_hand_recording
@@ -92,3 +93,10 @@ def test_a_jolt_does_not_cut_a_rest_in_two():
 def test_an_imu_that_was_moved_has_two_rests(jolt, way, seconds):
     shake = jolt * np.random.default_rng(4).standard_normal((round(100 * seconds), 3))
     assert len(detect_static(_stand(shake, way, seconds))) == 2
+
+
+@pytest.mark.parametrize("width", [1, 7, 100])
+def test_means_of_blocks_are_those_of_their_samples_to_the_digit(width):
+    values = np.random.default_rng(2).normal([0.0, 1e-3, 9.8], 1.0, (1003, 3))
+    whole = len(values) // width * width
+    assert np.array_equal(block_means(values, width), values[:whole].reshape(-1, width, 3).mean(axis=1))

@@ -155,7 +155,8 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     Parameters
     ----------
     screened : bool
-        Take away samples that are no measurement; not for the perfect ones of `nominal`, which stand still at rest.
+        Take away samples that are no measurement, weigh rough ones less, and look for tilts in rests; not for the
+        perfect samples of `nominal`, which stand still at rest.
     """
     recording, unsound = sound(recording) if screened else (recording, ())
     if len(recording.t) < NOMINAL_FROM + 1:
@@ -177,14 +178,17 @@ def reduce(recording: Recording, setup: TestSetup, screened: bool = True) -> Pre
     limits, vibrating = with_vibration(cycles, epochs, recording.phase, setup.limits, setup.gravity, density)
     phases = classify(epochs, recording.phase, limits, setup.gravity, setup.model.settle_s, PhaseState())
     phases = without_early_motion(epochs, recording.phase, phases, setup.imu.gyro_white_noise)
-    phases, tilted = without_tilts(epochs, recording.phase, phases, setup.imu, setup.model.settle_s)
+    tilted: tuple[DataFault, ...] = ()
+    if screened:
+        phases, tilted = without_tilts(epochs, recording.phase, phases, setup.imu, setup.model.settle_s)
     cycles = cycles[: int(epochs.last[-1])]
     found = bridges(cycles, epochs, phases.dwell, nominal, largest_acceleration(cycles), setup.gravity)
     found, steps = stepped(found, cycles, epochs, phases.dwell, recording.clock_steps, setup.gravity)
-    at, excess, rough = wild(recording)
-    let_go(recording.omega_ib_b, recording.f_ib_b)
-    found = weighed(found, epochs, at, excess)
-    unsound = (*unsound, *steps, *rough)
+    unsound = (*unsound, *steps)
+    if screened:
+        at, excess, rough = wild(recording)
+        let_go(recording.omega_ib_b, recording.f_ib_b)
+        found, unsound = weighed(found, epochs, at, excess), (*unsound, *rough)
     noise = (setup.imu.gyro_white_noise, setup.imu.accel_white_noise)
     lost = judge(cycles, epochs, phases, nominal, found, noise, unsound)
     faults = (

@@ -230,11 +230,19 @@ def _noiseless(x: Floats) -> bool:
     """Whether a channel has no noise to speak of, as a perfect simulation: what repeats in it is no fault."""
     if len(x) < 3:
         return True
-    # One reading that is no measurement must not make all others small.
     size = np.abs(x)
+    # Most channels have noise by any measure, which no sorting is needed to see.
+    if not _mostly_below(x, _PERFECT * float(size.max())):
+        return False
+    # One reading that is no measurement must not make all others small.
     few = max(len(x) // _BLOCK, _LEAST_AT_END)
     largest = float(np.partition(size, -few)[-few]) or float(size.max())
-    limit, count = _PERFECT * largest, len(x) - 2
+    return _mostly_below(x, _PERFECT * largest)
+
+
+def _mostly_below(x: Floats, limit: float) -> bool:
+    """Whether the median distance of samples from the line between their neighbours is below a limit."""
+    count = len(x) - 2
     # Counting is quicker than a median, which only a tie needs.
     below = 2 * sum(int(np.count_nonzero(_bend(x[rows]) < limit)) for rows in pieces(count, 2))
     return below > count if below != count else float(np.median(_bend(x))) < limit
@@ -348,12 +356,17 @@ def wild(recording: Recording) -> tuple[Floats, Floats, tuple[DataFault, ...]]:
         t = recording.t[rows]
         uneven[rows.start + 2 : rows.stop - 2] = np.abs(t[4:] - t[:-4] - 4.0 * interval) > interval / 2
     middle = recording.t[_WINDOW // 2 :: _WINDOW][:windows]
-    moving = _changing_rate(recording.omega_ib_b[: windows * _WINDOW].reshape(windows, _WINDOW, 3))
-    let_go(recording.omega_ib_b)
+    moving: Bools | None = None
     for name, rough in _on_channels(recording, lambda x: _roughness(x, uneven, windows)):
         usual = float(np.median(rough[rough > 0.0])) if rough.any() else 0.0
-        at = (rough > _WILD * usual) & ~moving
-        if usual == 0.0 or not at.any() or at.mean() > _RARE:
+        at = rough > _WILD * usual
+        if usual == 0.0 or not at.any():
+            continue
+        if moving is None:
+            moving = _changing_rate(recording.omega_ib_b[: windows * _WINDOW].reshape(windows, _WINDOW, 3))
+            let_go(recording.omega_ib_b)
+        at &= ~moving
+        if not at.any() or at.mean() > _RARE:
             continue
         ratio = rough / usual
         largest[at] = np.maximum(largest[at], ratio[at])

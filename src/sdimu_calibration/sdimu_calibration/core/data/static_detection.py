@@ -18,7 +18,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.data.windows import runs
+from sdimu_calibration.core.data.windows import block_means, runs
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
 
@@ -305,7 +305,7 @@ def two_sample_variance(values: Floats, first: Ints, last: Ints, width: int) -> 
     """
     squares, count = 0.0, 0
     for a, b in zip(first, last, strict=True):
-        means = values[a : a + (b - a) // width * width].reshape(-1, width, 3).mean(axis=1)
+        means = block_means(values[a:b], width)
         squares += float(np.sum(np.diff(means, axis=0) ** 2))
         count += max(len(means) - 1, 0)
     return 0.5 * squares / max(3 * count, 1), count

@@ -237,6 +237,27 @@ def _sum_before(x: Floats, mean: Floats, at: Ints, reached: int, total: Floats, 
     return reached
 
 
+def block_means(values: Floats, width: int) -> Floats:
+    """Means over neighbouring samples, block by block; what does not fill a block at the end is left out.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+        In any unit.
+    width : int
+        Samples of a block.
+
+    Returns
+    -------
+    ndarray, shape (n // width, 3)
+        In that unit.
+    """
+    blocks = len(values) // width
+    # Blocks side by side: sums over rows of three are four times as slow.
+    beside = np.ascontiguousarray(values[: blocks * width].reshape(blocks, width * 3).T).reshape(width, 3, blocks)
+    return np.ascontiguousarray((beside.sum(axis=0) / width).T)
+
+
 def turned(w: Floats, windows: Windows, chosen: Ints, factor: float) -> Floats:
     """Rotation over windows as the gyros say it.
 

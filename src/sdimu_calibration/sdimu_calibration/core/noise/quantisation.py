@@ -18,7 +18,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.static_detection import resolution, two_sample_variance
-from sdimu_calibration.core.data.windows import runs
+from sdimu_calibration.core.data.windows import block_means, runs
 from sdimu_calibration.core.noise.rests import TURNING, at_rest
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -120,16 +120,13 @@ def _suspect(recording: Recording, triads: Sequence[tuple[Floats, float]]) -> bo
     if seconds < _PAIRS:
         return False
 
-    def means(values: Floats) -> Floats:
-        return np.asarray(values[: seconds * width].reshape(seconds, width, 3).mean(axis=1))
-
-    rate = means(recording.omega_ib_b)
+    rate = block_means(recording.omega_ib_b, width)
     still = np.max(np.abs(rate - np.median(rate, axis=0)), axis=1) < TURNING
     pair = still[1:] & still[:-1]
     if pair.sum() < _PAIRS:
         return False
     for values, noise in triads:
-        steps = np.sum(np.diff(means(values), axis=0)[pair] ** 2, axis=1)
+        steps = np.sum(np.diff(block_means(values, width), axis=0)[pair] ** 2, axis=1)
         variance = float(np.median(steps)) / (2.0 * 3.0 * _MEDIAN_CHI2)
         if variance * width * recording.interval_s > _SUSPECT**2 * noise**2:
             return True
