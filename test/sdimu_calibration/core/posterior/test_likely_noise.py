@@ -10,7 +10,7 @@ from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, kind
 from sdimu_calibration.core.evidence.noise_kernels import kernel, stretches
 from sdimu_calibration.core.noise_term import FOLLOWS, KINDS, MARKOV, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import ODDS, SHARE, USUAL_SPREAD, Sizes
-from sdimu_calibration.core.posterior.noise_search import likeliest
+from sdimu_calibration.core.posterior.noise_search import _Search, explored, likeliest
 
 STOPS = 12
 WANDERING = [k for k in KINDS if k not in FOLLOWS]
@@ -97,3 +97,21 @@ def test_noise_of_one_triad_is_not_told_of_the_other(cut):
     triads = [{t.triad for t in found_in(drawn(cut, true, seed), cut)} for seed in range(1, 21)]
     assert all("accel" in of for of in triads)
     assert sum("gyro" in of for of in triads) <= 3
+
+
+def test_the_search_sizes_each_kind_of_noise_once_beside_the_same_noise(cut, monkeypatch):
+    """Pairs, exchanges and the search among noise that wanders by itself come back to what was added one by one."""
+    terms = [NoiseTerm("gyro", "turn", 0.0, 6.0), NoiseTerm("accel", "random_walk", 0.0, 0.5)]
+    asked, plain = [], _Search._in_sensors
+
+    def counted(search, given, alike):
+        asked.append((given.J.tobytes(), given.d.tobytes(), tuple(term.identity for term in alike)))
+        return plain(search, given, alike)
+
+    monkeypatch.setattr(_Search, "_in_sensors", counted)
+    apart = drawn(cut, terms, 3)
+    # What one triad is told hangs on the noise of the other.
+    found = explored(NoiseInformation(apart.J + 0.01, apart.d), cut, USUAL)
+    assert {term.triad for term in found[0][1].terms} == set(TRIADS)
+    assert len(asked) > len(kinds(cut))
+    assert len(set(asked)) == len(asked)

@@ -44,8 +44,9 @@ _SHORTEST_DWELL_S = 3.0
 """Shortest dwell (s): what is shorter is a part of the turn."""
 _BLOCK = 48
 """Number of stretches that a thread works on at a time: fewer would repeat the response of the navigation."""
-_EFFECTS = 12
-"""Number of effects that a thread works on at a time: their regressors over an hour stay in its cache."""
+_EFFECTS = 24
+"""Number of effects that a thread works on at a time: fewer would repeat the response of the navigation, the regressors
+of more over an hour leave its cache."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ prior holds the share of the prior that lies where the likelihood does: so the b
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, product, repeat
 
@@ -64,7 +64,14 @@ class _Search:
         self.information, self.cut, self.usual = information, cut, usual
         self.tried = every_kind(cut) if tried is None else list(tried)
         self.seen: dict[frozenset[Identity], _Found] = {}
+        self._sized: dict[Hashable, list[tuple[NoiseTerm, float]]] = {}
         self._looked_beside: set[tuple[str, frozenset[Identity]]] = set()
+
+    def among(self, tried: Sequence[NoiseTerm]) -> _Search:
+        """Begin anew with some kinds alone; what was sized stays known."""
+        again = _Search(self.information, self.cut, self.usual, tried)
+        again._sized = self._sized
+        return again
 
     def keep(self, found: _Found) -> _Found:
         """Remember a noise."""
@@ -89,20 +96,31 @@ class _Search:
     def one_more(self, base: _Found, triads: Collection[str] = TRIADS) -> list[_Found]:
         """Add each kind of noise of some triads to a noise, at its best size, where that is seen at all."""
         terms = base.noise.terms
-        room = []
-        for term in self.tried:
-            own = _of_triad(NoiseModel(terms), term.triad)
-            if term.triad in triads and len(own) < MOST_TERMS and not _is_in(term, own):
-                room.append(term)
-        given = {name: self.information.of_triad(name, terms, self.cut) for name in {t.triad for t in room}}
         alike: dict[tuple[str, str, float], list[NoiseTerm]] = {}
-        for term in room:
-            alike.setdefault(term.identity[:3], []).append(term)
-        sized = side_by_side(lambda own: self._in_sensors(given[own[0].triad], own), alike.values())
+        for term in self.tried:
+            own = _of_triad(base.noise, term.triad)
+            if term.triad in triads and len(own) < MOST_TERMS and not _is_in(term, own):
+                alike.setdefault(term.identity[:3], []).append(term)
+        sized = self._sized_beside(base.noise, list(alike.values()))
         return [
             self.keep(_Found(NoiseModel((*terms, term), (*base.noise.shares, share)), base.gain + term.gain))
             for term, share in chain.from_iterable(sized)
         ]
+
+    def _sized_beside(
+        self, noise: NoiseModel, alike: Sequence[Sequence[NoiseTerm]]
+    ) -> list[list[tuple[NoiseTerm, float]]]:
+        """Best sizes of kinds of noise beside a noise, each worked out once: steps of the search come back to it."""
+        beside = tuple(tuple((t.identity, t.size) for t in _of_triad(noise, triad)) for triad in TRIADS)
+        keys = [(beside, tuple(t.identity for t in own)) for own in alike]
+        new = {key: own for key, own in zip(keys, alike, strict=True) if key not in self._sized}
+        given = {
+            triad: self.information.of_triad(triad, noise.terms, self.cut)
+            for triad in {own[0].triad for own in new.values()}
+        }
+        found = side_by_side(lambda own: self._in_sensors(given[own[0].triad], own), new.values())
+        self._sized.update(zip(new, found, strict=True))
+        return [self._sized[key] for key in keys]
 
     def _in_sensors(self, given: InTriad, terms: Sequence[NoiseTerm]) -> list[tuple[NoiseTerm, float]]:
         """Best sizes of one kind of noise in each choice of sensors; a sensor that alone has none is in no choice."""
@@ -362,7 +380,10 @@ def explored(
         of one of its own. The last one is far behind where all others have terms that stand in the place of
         effects: it is the likeliest without them.
     """
-    search = _Search(information, cut, usual, tried)
+    return _explored(_Search(information, cut, usual, tried), rival, brief)
+
+
+def _explored(search: _Search, rival: float, brief: bool) -> list[tuple[float, NoiseModel]]:
     best = search.climbed(rival)
     if best is None:
         return []
@@ -383,4 +404,4 @@ def explored(
     if any(noise.wanders_alone for _, noise in near):
         return near
     wandering = [term for term in search.tried if term.kind not in DRAWN]
-    return [*near, *explored(information, cut, usual, wandering, brief=brief)[:1]]
+    return [*near, *_explored(search.among(wandering), 0.0, brief)[:1]]
