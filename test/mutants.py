@@ -69,12 +69,12 @@ MUTANTS = (
         "within",
         (f"{TESTS}/posterior", f"{TESTS}/diagnosis"),
     ),
-    Mutant("second_order/bend.py", "more + 2.0 * np.outer(q, q)", "more + np.outer(q, q)", (f"{TESTS}/second_order",)),
+    Mutant("filter/bend.py", "more + 2.0 * np.outer(q, q)", "more + np.outer(q, q)", (f"{TESTS}/filter",)),
     Mutant(
-        "filter/passes.py",
+        "filter/pass_setup.py",
         " = setup.sensors.prior_covariance\n",
         " = np.diag(setup.sensors.prior**2)\n",
-        (f"{TESTS}/second_order",),
+        (f"{TESTS}/filter",),
     ),
     Mutant("effects/misalignment.py", "[-z, y, z, -x, -y, x]", "[-z, y, z, -x, y, x]", ("test/effects",)),
     Mutant(

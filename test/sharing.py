@@ -83,7 +83,7 @@ LONGEST = (
     "test/sdimu_calibration/core/diagnosis/test_families.py",
     "test/recovery/test_recovery.py",
     "test/sdimu_calibration/core/diagnosis/test_strong_effects.py",
-    "test/sdimu_calibration/core/second_order/test_second_order.py",
+    "test/sdimu_calibration/core/filter/test_percents.py",
     "test/sdimu_calibration/core/noise/test_quantisation.py",
     "test/sdimu_calibration/cli/test_diagnose.py",
     "test/sdimu_calibration/core/posterior/test_combinations.py",

@@ -19,7 +19,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.filter.passes import MOST_PASSES
+from sdimu_calibration.core.filter.pass_loop import MOST_PASSES
 from sdimu_calibration.core.planning.predict import predict
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import ImuSpecification, Model

@@ -19,7 +19,8 @@ from sdimu_calibration.core.effect_key import sized
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import one_pass, pass_settings
+from sdimu_calibration.core.filter.pass_setup import pass_settings
+from sdimu_calibration.core.filter.passes import begun, linearise, run_linearised
 from sdimu_calibration.core.measurement_kind import HELD_ALL, SKIP
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.rotation import rotation_vector
@@ -107,11 +108,13 @@ def perfect():
 
 
 def passed(perfect, effect):
-    """Open-loop pass over the perfect test with this effect alone, linearised at zero."""
+    """Pass over the perfect test with this effect alone, about zero and one attitude: no shift from stop to stop."""
     setup = set_up(SITE, IMU, Model((effect,)))
     start = first_attitude(perfect.prepared.epochs, perfect.prepared.phases, setup)
     none = np.zeros(len(setup.sensors.prior))
-    return one_pass(perfect.prepared, setup, start, start.C_nb, none, closed_loop=False, keep=True), setup
+    at = linearise(perfect.prepared, setup, start.C_nb, none)
+    at = replace(at, data=at.data._replace(shift=np.full_like(at.data.shift, -1)))
+    return run_linearised(at, setup, begun(at, setup, start), keep=True), setup
 
 
 # -- what an effect says of itself ------------------------------------------------------------------------------------

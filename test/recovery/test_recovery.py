@@ -13,6 +13,7 @@ import pytest
 from scipy.stats import chi2
 
 from sdimu_calibration.core.effects import registry
+from sdimu_calibration.core.effects.body_frame import values_in_frame
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import Recording
@@ -158,10 +159,21 @@ def test_the_right_signs_pass_where_wrong_ones_must_fail(nothing_small):
 def test_a_wrong_sign_in_any_one_regressor_is_caught(parameter, nothing_small):
     """The estimate is off by many sigmas of the right calibration. (A wrong misalignment also breaks the gauge: then
     the claimed sigma is as large as the error, and only the right one tells.)"""
-    recording, coefficients, right = nothing_small
-    wrong = calibrate(recording, SITE, IMU, with_wrong_sign(parameter), held_out=False)
-    found = errors_of(wrong, coefficients)
-    assert np.abs(found.error / np.sqrt(np.diag(right.covariance))).max() > 8.0
+    assert furthest(with_wrong_sign(parameter), parameter, nothing_small) > 8.0
+
+
+def test_the_right_signs_are_found_right_in_the_frame_of_their_priors_too(nothing_small):
+    assert furthest(MODEL, PINNED[0], nothing_small) < 4.0
+
+
+def furthest(model, parameter, known):
+    """Largest error of an estimate, in sigmas of the right calibration and in its frame."""
+    # What the accelerometers' frame makes zero has regressors in the frame of the priors alone.
+    model = replace(model, body_frame="prior") if parameter in PINNED else model
+    found = calibrate(known.recording, SITE, IMU, model, held_out=False)
+    turned = values_in_frame(found.names, found.values, MODEL.body_frame)
+    error = errors_of(replace(found, values=turned, body_frame=MODEL.body_frame), known.coefficients).error
+    return np.abs(error / np.sqrt(np.diag(known.right.covariance))).max()
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rate_table_sim.core import TableSpecification
-from sdimu_calibration.core.filter.passes import MOST_PASSES
+from sdimu_calibration.core.filter.pass_loop import MOST_PASSES
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site

@@ -80,7 +80,7 @@ def measure(plan: str, rate: float, repeats: int, folder: Path) -> list[tuple[st
     n = len(recording.t)
 
     def one() -> None:
-        one_pass(prepared, setup, start, start.C_nb, found.values, closed_loop=False)
+        one_pass(prepared, setup, start, start.C_nb, found.values)
 
     def whole() -> None:
         write_result(folder / "result.json", calibrate(read_recording(bag), site, imu, model))

@@ -12,7 +12,7 @@ from hypothesis import settings
 
 from rate_table_sim.core.specification import TableSpecification
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
-from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
@@ -110,7 +110,7 @@ class Bench:
     def recording(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Recording:
         return _recording(seed, effects, plan)
 
-    def fit(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> FilterFit:
+    def fit(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> NavigationFit:
         return _fit(seed, effects, plan)
 
     def diagnosis(self, seed: int = 101, effects: tuple[str, ...] = (), plan: str = "kim18_signed") -> Diagnosis:
@@ -127,7 +127,7 @@ def _recording(seed: int, effects: tuple[str, ...], plan: str) -> Recording:
 
 
 @cache
-def _fit(seed: int, effects: tuple[str, ...], plan: str) -> FilterFit:
+def _fit(seed: int, effects: tuple[str, ...], plan: str) -> NavigationFit:
     return solve(PreparedTest(_recording(seed, effects, plan), BENCH.imu, BENCH.site), BENCH.model)
 
 

@@ -9,11 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
 from sdimu_calibration.core.data.axes_and_units import Stated
+from sdimu_calibration.core.effects.body_frame import values_in_frame
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.filter.passes import SNAPSHOT_EPOCHS
+from sdimu_calibration.core.filter.filter_pass import new_output, run_pass
+from sdimu_calibration.core.filter.pass_setup import pass_input, pass_settings, start_state
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
+from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.recording import DataError, seconds
 
 START = 1_700_000_000 * NS
@@ -106,13 +110,21 @@ def test_one_corrupt_sample_costs_neither_the_filter_on_the_way_nor_the_end(name
     np.testing.assert_array_equal(live.finish().values, without.finish().values)
 
 
-def test_stepping_is_the_first_pass_of_the_offline_answer(recording, site, imu, options, model):
+def test_stepping_is_one_closed_loop_pass_over_the_whole_test(recording, site, imu, options, model):
     _, estimates = feed(recording, options, model, [333] * 20)
-    history = calibrate(recording, site, imu, model, held_out=False).history
-    rows = estimates[::SNAPSHOT_EPOCHS]
-    assert len(rows) == len(history.t)
-    np.testing.assert_allclose([e.t for e in rows], history.t, rtol=0, atol=1e-9)
-    np.testing.assert_array_equal([e.coefficients for e in rows], history.value)
+    setup = set_up(site, imu, model)
+    prepared, sensors = reduce(recording, setup), setup.sensors
+    start, none = first_attitude(prepared.epochs, prepared.phases, setup), np.zeros(len(sensors.prior))
+    around = setup.around(prepared.temperature)
+    cycles, rest, zero = prepared.cycles, prepared.rest, Correction(sensors, none)
+    seen = motion(cycles, rest, zero, start.C_nb.copy(), around, predicted=False, causal=True)
+    data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
+    output = new_output(len(prepared.epochs), len(none), False, 1)
+    run_pass(data, pass_settings(setup, closed_loop=True), start_state(setup, start, start.C_nb, none), output)
+    assert len(estimates) == len(prepared.epochs)
+    np.testing.assert_allclose([e.t for e in estimates], prepared.epochs.end, rtol=0, atol=1e-9)
+    expected = values_in_frame(sensors.names, output.estimate, model.body_frame)
+    np.testing.assert_array_equal([e.coefficients for e in estimates], expected)
 
 
 def test_late_and_unusable_samples_are_counted_and_dropped(recording, options, model):

@@ -15,8 +15,8 @@ from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, p_value
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.diagnosis.verdict import error_falls
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, nis_judged
+from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 from sdimu_calibration.core.estimation.free_inertial import NOTHING
-from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.noise_term import FLICKER, NoiseTerm
 from sdimu_calibration.core.note import Topic
 from sdimu_calibration.core.results import Calibration

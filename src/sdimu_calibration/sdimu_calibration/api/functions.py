@@ -184,7 +184,7 @@ def calibrate(
     add : sequence of str
         Effects to add, as for `sdimu calibrate --add`.
     estimator : str
-        ``auto``, ``filter``, ``second-order``, ``handheld`` (or ``hand``), ``batch`` or ``classical``.
+        ``auto``, ``filter``, ``handheld`` (or ``hand``), ``batch`` or ``classical``.
     progress : callable
         Called with a word and the fraction done.
     """

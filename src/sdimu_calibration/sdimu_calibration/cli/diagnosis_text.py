@@ -94,7 +94,7 @@ def notes_of_diagnosis(d: Diagnosis) -> tuple[str, ...]:
 
     What stands among the findings is not said twice.
     """
-    from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
+    from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 
     if d.fit.learns_scatter:
         return without_advice(d.after.notes)

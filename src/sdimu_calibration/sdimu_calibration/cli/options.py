@@ -233,7 +233,7 @@ class Fitted:
 
     model: ChosenModelOption = None
     estimator: Annotated[
-        str, typer.Option(help="filter, second-order, handheld, batch, classical; auto chooses one of the first three.")
+        str, typer.Option(help="filter, handheld, batch, classical; auto chooses one of the first two.")
     ] = "auto"
     hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")] = False
     add: Annotated[

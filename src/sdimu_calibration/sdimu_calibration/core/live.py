@@ -29,7 +29,7 @@ from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.filter.filter_pass import PassInput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import pass_settings, start_state
+from sdimu_calibration.core.filter.pass_setup import no_shifts, pass_settings, start_state
 from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
 from sdimu_calibration.core.live_model import live_model
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
@@ -386,6 +386,7 @@ class LiveCalibration:
             sensors.regressors(seen),
             sensors.channel,
             sensors.parameter,
+            *no_shifts(1),
         )
         out = new_output(1, len(sensors.prior), False, 1)
         run_pass(data, self._settings, self._state, out)

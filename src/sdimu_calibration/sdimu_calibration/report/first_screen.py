@@ -17,8 +17,8 @@ from sdimu_calibration.core.diagnosis.grades import name_of
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
-from sdimu_calibration.core.estimation.navigation_fit import MISFIT
-from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
+from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
+from sdimu_calibration.core.estimation.fit_words import MISFIT
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital, first_of
 from sdimu_calibration.core.results import Calibration

@@ -20,7 +20,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from sdimu_calibration.core.estimation.navigation_fit import MISFIT
+from sdimu_calibration.core.estimation.fit_words import MISFIT
 from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit

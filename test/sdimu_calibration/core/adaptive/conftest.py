@@ -3,9 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.effects.accelerometer_frame import as_asked
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.filter.passes import Solution, one_pass
+from sdimu_calibration.core.filter.passes import one_pass
+from sdimu_calibration.core.filter.solution import Solution
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.storage.files.config import load_imu, load_site
@@ -19,22 +21,17 @@ TURNS = tuple(
 DWELLS = (20.0, 15.0, 40.0, 12.0, 30.0)
 
 
-def perfect_fit(plan: Plan, add: tuple[str, ...] = ()) -> FilterFit:
+def perfect_fit(plan: Plan, add: tuple[str, ...] = ()) -> NavigationFit:
     """Fit of a perfect IMU's recording of a plan: its covariance is that of a prediction."""
     site, imu, model = load_site("daejeon"), load_imu("dtg"), named_model("baseline", add)
     nominal = prepare(plan, site, imu, model, None, None)
     setup = nominal.setup
-    done = one_pass(
-        nominal.prepared,
-        setup,
-        nominal.start,
-        nominal.start.C_nb,
-        np.zeros(len(setup.sensors.prior)),
-        closed_loop=False,
-    )
-    solution = Solution(setup, nominal.prepared, nominal.start, done, done, 1, converged=True)
+    done = one_pass(nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(setup.sensors.prior)))
+    solution = Solution(setup, nominal.prepared, nominal.start, done, 1, converged=True)
     test = PreparedTest(nominal.recording, imu, site)
-    return FilterFit(test, model, setup.sensors, setup, nominal.prepared, nominal.start, solution)
+    sensors = setup.sensors
+    frame = as_asked(sensors, model.body_frame)
+    return NavigationFit(test, model, sensors, setup, nominal.prepared, nominal.start, solution, frame)
 
 
 def part(stops: int) -> Plan:
@@ -43,5 +40,5 @@ def part(stops: int) -> Plan:
 
 
 @pytest.fixture(scope="session")
-def first_stop() -> FilterFit:
+def first_stop() -> NavigationFit:
     return perfect_fit(part(1))

@@ -13,7 +13,7 @@ from sdimu_calibration.core.adaptive.knowledge import ratios
 from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
 from sdimu_calibration.core.adaptive.worth import worth
 from sdimu_calibration.core.effects.selection import resolve
-from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.plan import Plan, Turn
@@ -117,7 +117,7 @@ def test_no_move_is_longer_than_the_time_that_is_left(known):
     assert choice.minutes <= 0.5
 
 
-def with_open(fit: FilterFit, goals: Goals, pair: tuple[str, str]) -> Knowledge:
+def with_open(fit: NavigationFit, goals: Goals, pair: tuple[str, str]) -> Knowledge:
     """What is known where the last effect of a model is found at three sigmas of its prior, and another looks alike."""
     at, count = so_far(fit, [resolve(pair[1])], 30.0), len(fit.names)
     size = 3.0 * at.setup.sensors.prior[[count - 1, count]] / np.array([1.0, 30.0])
@@ -170,7 +170,7 @@ def test_no_turn_leads_to_one_that_the_table_cannot_make_after_it():
     assert "leads to" not in choice.reason
 
 
-def level_fit() -> FilterFit:
+def level_fit() -> NavigationFit:
     """Fit where y and z were upright both ways, and x never was."""
     turns = tuple(Turn("X", math.radians(90.0), math.radians(10.0)) for _ in range(4))
     return perfect_fit(Plan("x level", (30.0,) * 5, turns, ACCELERATION))

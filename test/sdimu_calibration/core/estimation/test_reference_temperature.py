@@ -48,11 +48,7 @@ def hand_run(imu):
 
 @pytest.mark.parametrize(
     ("imu", "made", "estimator"),
-    [
-        ("dtg", table_test, "filter"),
-        ("mems_industrial", table_test, "second-order"),
-        ("mems_by_hand", hand_run, "handheld"),
-    ],
+    [("dtg", table_test, "filter"), ("mems_industrial", table_test, "filter"), ("mems_by_hand", hand_run, "handheld")],
 )
 def test_another_reference_moves_the_biases_by_the_coefficient_and_no_prediction(imu, made, estimator):
     recording, site, model = made(load_imu(imu))

@@ -57,8 +57,8 @@ def off(**sigmas):
 
 
 @cache
-def fitted(estimator="filter", effects=()):
-    return solve(PreparedTest(recorded(effects)[0], IMU, off(**SIGMAS)), MODEL, estimator)
+def fitted(effects=()):
+    return solve(PreparedTest(recorded(effects)[0], IMU, off(**SIGMAS)), MODEL)
 
 
 @cache
@@ -76,9 +76,8 @@ def at_its_word():
     return solve(PreparedTest(recorded()[0], IMU, SITE), MODEL)
 
 
-@pytest.mark.parametrize("estimator", ["filter", "second-order"])
-def test_coefficients_are_honest_at_a_site_that_is_off_by_what_it_states(estimator):
-    result = outcome(fitted(estimator))
+def test_coefficients_are_honest_at_a_site_that_is_off_by_what_it_states():
+    result = outcome(fitted())
     z = baseline_z(result, recorded()[1].imu)
     # 27 errors over sigma: their RMS scatters by a seventh.
     assert 0.6 < np.sqrt(np.mean(z**2)) < 1.45
@@ -221,7 +220,7 @@ def test_recordings_of_a_set_share_what_their_site_is_off_by():
     ratio = dict(zip(rows.names, many / few, strict=True))
     assert ratio["accel_scale_x"] > 0.99
     assert ratio["accel_bias_x"] < 0.4
-    about = fit_about(fit.test, fit.model, "filter", dict.fromkeys(fit.names, 0.0) | {"reference_gravity": 1e-3})
+    about = fit_about(fit.test, fit.model, dict.fromkeys(fit.names, 0.0) | {"reference_gravity": 1e-3})
     assert about.estimate[-1] == 1e-3
     assert about.names == fit.names
 

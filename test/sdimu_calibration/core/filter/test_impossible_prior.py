@@ -61,7 +61,8 @@ def test_of_an_imu_file_its_own_key_is_named(bench):
 
 def test_usual_priors_are_blamed_for_nothing(bench):
     fit = bench.fit()
-    assert impossible_prior(fit.setup.sensors, fit.solution.last.data.values, "mine.yaml") == ""
+    sensors = fit.setup.sensors
+    assert impossible_prior(sensors, sensors.regressors(fit.known.seen), "mine.yaml") == ""
 
 
 def test_a_motion_that_an_earlier_pass_made_of_it_blames_no_prior(bench):
@@ -87,5 +88,5 @@ def test_a_wide_prior_that_the_filter_bears_is_not_refused(bench):
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_what_is_too_large_to_be_squared_is_told_without_a_warning(bench):
     fit = bench.fit()
-    values = fit.solution.last.data.values * 1e200
+    values = fit.setup.sensors.regressors(fit.known.seen) * 1e200
     assert "no sensor has" in impossible_prior(fit.setup.sensors, values, "mine.yaml")

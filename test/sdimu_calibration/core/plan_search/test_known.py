@@ -10,7 +10,7 @@ import pytest
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
-from sdimu_calibration.core.evidence.known import data_information, known_from
+from sdimu_calibration.core.evidence.known import data_information, in_frame_of_priors, known_from
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.plan_search import Goal, Known, Question, gain, known_of, next_turn, search
 from sdimu_calibration.core.plan_search.bound import already, bounds
@@ -120,7 +120,7 @@ def test_a_search_without_limits_finds_what_tells_more_in_the_same_time(known):
 def test_a_fit_and_its_report_know_what_its_covariance_says():
     recording = nominal_recording(KIM18, BASELINE.site)
     fit = solve(PreparedTest(recording, BASELINE.imu, BASELINE.site), BASELINE.model, "filter")
-    of_evidence = known_of(fit.evidence(), np.empty(0, dtype=np.int64))
+    of_evidence = in_frame_of_priors(known_of(fit.evidence(), np.empty(0, dtype=np.int64)), fit.sensors)
     sensors = fit.sensors
     F = body_frame.frame_jacobian(sensors.names, BASELINE.model.body_frame)
     of_report = known_from(fit.names, fit.covariance, sensors.prior, F)

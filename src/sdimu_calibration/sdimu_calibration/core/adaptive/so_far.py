@@ -19,7 +19,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.filter.filter_pass import PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import check_finite, pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.pass_setup import check_finite, pass_input, pass_settings, start_state
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.plan import Plan, Turn
@@ -30,7 +30,7 @@ _BEFORE_S = 2.0
 """Rest before a turn that is simulated (s): whole epochs; it is not measured again."""
 _SQUARE = 0.94
 """Cosine (1) from which two axes are along each other: within 20 deg, half of what an oblique stop leans."""
-_BY_EPOCH = ("first", "last", "white", "gap_angle", "gap_velocity", "kind")
+_BY_EPOCH = ("first", "last", "white", "gap_angle", "gap_velocity", "kind", "shift")
 """Fields of `PassInput` with one row an epoch."""
 _NEVER_RAD_S2 = 1.0
 """Acceleration of a plan without a turn (rad/s^2): nothing reads it."""
@@ -99,10 +99,13 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, h
     """
     model = replace(fit.model, effects=cast("tuple[str, ...]", (*fit.sensors.effects, *more, *hiding)))
     setup = set_up(fit.test.site or fit.setup.site, fit.test.imu, model, fit.setup.epoch_s)
-    sensors, had = setup.sensors, dict(zip(fit.setup.sensors.names, fit.setup.sensors.prior, strict=True))
+    sensors, before, now = setup.sensors, fit.frame_model.inner.prior, fit.setup.sensors
+    # In the frame of the priors, which is not that of the fit: but what was found too narrow is as wide as there.
+    had = {n: w for n, w, was in zip(now.names, now.prior, before, strict=True) if w != was}
     hidden = {p.name for effect in hiding for p in effect.parameters}
+    own = {*fit.names, *hidden}
     prior = np.array(
-        [had.get(n, s if n in hidden else room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)]
+        [had.get(n, s if n in own else room * s) for n, s in zip(sensors.names, sensors.prior, strict=True)]
     )
     setup = replace(setup, sensors=replace(sensors, prior=prior))
     prepared, reference = fit.test.data(setup), fit.start.coefficients_of(sensors.names)

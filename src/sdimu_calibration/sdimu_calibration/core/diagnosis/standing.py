@@ -12,7 +12,7 @@ from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.known import Known, Standing, class_of, is_lasting, known_of
+from sdimu_calibration.core.evidence.known import Known, Standing, class_of, in_frame_of_priors, is_lasting, known_of
 
 
 def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
@@ -33,7 +33,8 @@ def standing(d: Diagnosis, found: Sequence[Found]) -> Standing:
         if together:
             classes.append(tuple(c.label for c in together))
         members |= {c.label: c for c in together or (one.candidate,) if is_lasting(c.effect)}
-    known = known_of(evidence, np.array([place[label] for label in members], dtype=np.int64))
+    own = known_of(evidence, np.array([place[label] for label in members], dtype=np.int64))
+    known = in_frame_of_priors(own, d.fit.sensors)
     effects: list[str | Effect] = [*d.fit.model.effects, *(c.effect for c in members.values())]
     of_power_on = {name for effect in effects for name in _of_power_on(effect)}
     test = d.fit.test

@@ -1,4 +1,4 @@
-"""A model whose body frame is that of the accelerometers from the start, for errors of percents.
+"""A model whose body frame is that of the accelerometers from the start.
 
 Turning the body frame changes no measurement (`body_frame`). With errors of arcminutes the priors hold that free turn
 and nobody feels it. With errors of degrees it is the end of every iteration: the strong rows of the data cancel along
@@ -6,9 +6,13 @@ the turn only as well as the derivatives are right, and what does not cancel out
 no unknown: q_xy = q_xz = q_yx = 0 leave the model. Their polynomials of the temperature stay: the turn that they leave
 free is small, and what is reported is turned to the frame at every temperature.
 
+A model that has not all three of them has no such turn, or holds it by what it lacks: it stays as it is, and so does
+one that is asked for in the frame of its priors.
+
 What the turn takes along must be put back. Six of nine elements of the gyros' response to force are mass unbalance in
 the frame in which the sensor was built; in the turned frame the other three are products of unbalance and
-misalignment. They become parameters of that size, estimated and not reported, as the turned frame has no name for them.
+misalignment. They become parameters of that size that serve: estimated and not reported, as the turned frame has no
+name for them.
 """
 
 from __future__ import annotations
@@ -21,9 +25,9 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import body_frame, imu_model, registry
-from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.imu_model import ImuModel
-from sdimu_calibration.core.specification import EPOCH_S, MOST_EPOCHS, ImuSpecification
+from sdimu_calibration.core.effects.effect import REFERENCES, Effect
+from sdimu_calibration.core.effects.imu_model import ImuModel, with_serving
+from sdimu_calibration.core.specification import ImuSpecification
 
 FRAME = "accelerometer_triad"
 _OUTSIDE = ("gyro_g_sensitivity_xz", "gyro_g_sensitivity_yz", "gyro_g_sensitivity_zx")
@@ -44,6 +48,10 @@ class AccelerometerFrameModel:
     """`asked`, `inner`: with p and q parameters."""
     place: Ints
     """Shape (p,). Place of each parameter asked for among the inner ones; -1 for what is zero by definition."""
+    frame: str = FRAME
+    """Of the report, one of `body_frame.FRAMES`."""
+    turned: bool = True
+    """The inner model is in the accelerometers' frame; else it is the one asked for, with what serves behind it."""
 
     def values(self, inner: Floats) -> Floats:
         """Read the parameters asked for out of the inner ones, shape (..., p); zero where the frame pins one.
@@ -53,6 +61,8 @@ class AccelerometerFrameModel:
         inner : ndarray, shape (..., q)
             SI, in the accelerometers' frame.
         """
+        if not self.turned:
+            return body_frame.values_in_frame(self.asked.names, self._at_start(inner), self.frame)
         return body_frame.at_every_temperature(self.asked.names, self._at_start(inner))
 
     def _at_start(self, inner: Floats) -> Floats:
@@ -71,7 +81,10 @@ class AccelerometerFrameModel:
         """
         at, known = np.maximum(self.place, 0), self.place >= 0
         P = inner[..., at[:, None], at] * np.outer(known, known)
-        J = body_frame.temperature_jacobian(self.asked.names, self._at_start(about))
+        if self.turned:
+            J = body_frame.temperature_jacobian(self.asked.names, self._at_start(about))
+        else:
+            J = body_frame.frame_jacobian(self.asked.names, self.frame)
         return np.asarray(J @ P @ J.T)
 
 
@@ -81,37 +94,39 @@ def squares_count(sensors: ImuModel) -> bool:
     return bool(len(linear)) and float(np.max(sensors.prior[linear])) > LARGE
 
 
+def are_large(names: Sequence[str], weight: Floats) -> bool:
+    """Tell the same as `squares_count` of coefficients by name.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+    weight : ndarray, shape (p,)
+        Prior information of each (1/SI^2).
+    """
+    return any(_SCALE_OR_ANGLE.search(n) and w < LARGE**-2.0 for n, w in zip(names, weight.tolist(), strict=True))
+
+
 def scales_and_angles(sensors: ImuModel) -> Ints:
     """List the places of scale factors and misalignments, ascending, shape (k,)."""
     found = [i for i, p in enumerate(sensors.parameters) if p.unit in ("1", "rad") and _SCALE_OR_ANGLE.search(p.name)]
     return np.array(found, dtype=np.int64)
 
 
-def drifting(sensors: ImuModel, imu: ImuSpecification, gravity: float, duration: float) -> bool:
-    """Tell whether the gyros lose the attitude so far over the test that the square of that counts.
+def model_in_frame(asked: ImuModel, imu: ImuSpecification, frame: str) -> AccelerometerFrameModel:
+    """Put a model into the accelerometers' frame where the report is asked for in it and the model can turn.
 
-    An attitude wrong by a shows gravity too small by g a^2 / 2. It counts when this, at three sigma of the gyros' white
-    noise over the test, exceeds three sigma of the mean force. In a long test a tenth of that counts: the ordinary
-    passes then take the second order for knowledge of the common turn of all axes and move on for dozens of passes
-    (12 h, navigation grade: by a third less each), where those of second order need five. Effects that change at
-    random are left to the ordinary passes, as samples are corrected at constants here: for them the answer is no.
-
-    `gravity`: m/s^2; `duration`: of the test (s).
+    `frame`: one of `body_frame.FRAMES`.
     """
-    if ((sensors.decay_rate > 0) | (sensors.drive > 0)).any():
-        return False
-    attitude = 3.0 * imu.gyro_white_noise * float(np.sqrt(duration))
-    sigmas = 3.0 if duration <= MOST_EPOCHS * EPOCH_S else 0.3
-    return bool(0.5 * gravity * attitude**2 > sigmas * imu.accel_white_noise / float(np.sqrt(duration)))
+    return (accelerometer_frame_model(asked, imu) if frame == FRAME else None) or as_asked(asked, frame)
 
 
-def accelerometer_frame_model(
-    asked: ImuModel, imu: ImuSpecification, more: Sequence[Effect] = ()
-) -> AccelerometerFrameModel | None:
-    """Put a model into the accelerometers' frame; None where it cannot turn because not all misalignments are in it.
+def as_asked(asked: ImuModel, frame: str) -> AccelerometerFrameModel:
+    """Leave a model in the frame of its priors, and turn what is reported; `frame` as for `model_in_frame`."""
+    return AccelerometerFrameModel(asked, asked, np.arange(len(asked.prior)), frame, turned=False)
 
-    `more`: what the estimator estimates along, behind all others, and does not report.
-    """
+
+def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> AccelerometerFrameModel | None:
+    """Put a model into the accelerometers' frame; None where it cannot turn as not all misalignments are in it."""
     pinned = set(body_frame.pinned_names())
     if not pinned <= set(asked.names):
         return None
@@ -121,25 +136,32 @@ def accelerometer_frame_model(
         if left:
             effects.append(effect if len(left) == len(effect.parameters) else effect.only(left))
     unbalance = [i for i, n in enumerate(asked.names) if n.startswith("gyro_mass_unbalance_d")]
-    outside = bool(unbalance) and not set(_OUTSIDE) & set(asked.names)
-    if outside:
-        effects.append(registry.get("gyro_g_sensitivity").only(_OUTSIDE))
-    inner = imu_model.build([*effects, *more], imu)
+    inner = imu_model.build(effects, imu)
     sizes = dict(zip(inner.names, inner.prior, strict=True))
     turned = _turned_prior(asked)
     sizes |= dict(zip(asked.names, np.sqrt(np.diag(turned)), strict=True))
-    if outside:
-        misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
-        sizes |= dict.fromkeys(_OUTSIDE, float(np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance])))
     stated = np.array([sizes[name] for name in inner.names])
     place = np.array([inner.names.index(n) if n in inner.names else -1 for n in asked.names])
     own = np.flatnonzero(asked.restated & (place >= 0))
     prior, mean, restated = stated.copy(), inner.mean.copy(), inner.restated.copy()
     prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
-    serving = sum(len(effect.parameters) for effect in more)
-    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated, serving=serving)
+    inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated)
     inner = replace(inner, correlation=_correlation(turned, np.where(asked.restated, -1, place), len(stated)))
+    if unbalance and not set(_OUTSIDE) & set(asked.names):
+        misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
+        size = np.full(len(_OUTSIDE), np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance]))
+        inner = with_serving(inner, [_turned_unbalance()], size, np.zeros(len(size)), np.zeros(len(size)))
     return AccelerometerFrameModel(asked, inner, place)
+
+
+def _turned_unbalance() -> Effect:
+    """Make the effect of what a turn of the frame makes of mass unbalance; its name is none of the catalogue's.
+
+    The catalogue's effect of the same columns has the size that physics gives it, and is looked for beside this one.
+    """
+    whole = registry.get("gyro_g_sensitivity").only(_OUTSIDE)
+    parameters = tuple(replace(p, name=f"turned_{p.name}") for p in whole.parameters)
+    return replace(whole, name="turned_mass_unbalance", family="", parameters=parameters, group=REFERENCES, sheet="")
 
 
 def _turned_prior(asked: ImuModel) -> Floats:

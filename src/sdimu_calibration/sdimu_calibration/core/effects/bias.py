@@ -28,6 +28,7 @@ GYRO_BIAS = register(
         description="What the gyro shows at rest against inertial space, free of specific force.",
         typical="navigation 0.005-1, tactical 1-10, MEMS 10-4000 deg/h",
         group=BASELINE,
+        linear=True,
         scope="power-on",
         confused_with=("gyro_mass_unbalance",),
     )
@@ -46,6 +47,7 @@ ACCEL_BIAS = register(
         description="What the accelerometer shows without specific force along its input axis.",
         typical="navigation 20-150, tactical 200-1000, MEMS 1000-50000 ug",
         group=BASELINE,
+        linear=True,
         scope="power-on",
     )
 )

@@ -114,6 +114,8 @@ class Effect:
         Has no meaning handheld: no reference but gravity is known, and no turn is known better than the gyros tell it.
     gauge : bool
         Part of the turn of the body frame that no measurement shows: only its prior holds it.
+    linear : bool
+        Its regressors are constants and multiples of rate and force: the slope of its errors is the same everywhere.
     never_seen : str
         Why no plan tells it from the model's coefficients, and what to do instead; empty when a plan can.
     decay_s : float or None
@@ -166,6 +168,7 @@ class Effect:
     positive: bool = False
     needs_table: bool = False
     gauge: bool = False
+    linear: bool = False
     never_seen: str = ""
     needs: str = ""
     tried_in: Literal["recording", "set", "request"] = "recording"

@@ -21,6 +21,7 @@ G_SENSITIVITY = register_family(
     matrix_columns(GYRO, lambda m: m.a),
     ("rad/s/g", "deg/h/g"),
     (0.3, 1, 50),
+    linear=True,
     sheet="g-sensitivity",
     typical="DTG spin axis 0.05-0.5, optical below 0.1, tactical 0.1-1, MEMS 1-100 deg/h/g",
     description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the baseline; "

@@ -92,13 +92,8 @@ class ImuModel:
         ndarray, shape (n, m)
             Change of sensor axis `channel` (rad/s or m/s^2) per SI unit of parameter `parameter`.
         """
-        out = np.empty((len(motion.t), len(self.channel)))
-        start = 0
-        for effect in self.effects:
-            end = start + len(effect.terms)
-            out[:, start:end] = effect.regressors(motion)
-            start = end
-        return out
+        none = np.empty((len(motion.t), 0))
+        return np.concatenate([none, *(effect.regressors(motion) for effect in self.effects)], axis=1)
 
     def errors(self, values: Floats, coefficients: Floats) -> Floats:
         """Sensor errors in b, measured minus true: gyros (rad/s), then accelerometers (m/s^2), shape (n, 6).
@@ -111,6 +106,51 @@ class ImuModel:
             SI.
         """
         return np.asarray(_errors(np.ascontiguousarray(values), self.channel, coefficients[self.parameter]))
+
+    def sized(self, coefficients: Floats) -> list[tuple[Effect, Floats]]:
+        """List the effects that have a coefficient, each with what its regressors do to the sensor axes.
+
+        Parameters
+        ----------
+        coefficients : ndarray, shape (p,)
+            SI.
+
+        Returns
+        -------
+        list of (Effect, ndarray of shape (k, 6))
+            The map takes the k terms of the effect to its errors (rad/s, m/s^2).
+        """
+        out, first = [], 0
+        for effect in self.effects:
+            terms = np.arange(first, first + len(effect.terms))
+            first += len(terms)
+            size = coefficients[self.parameter[terms]]
+            if size.any():
+                to_axes = np.zeros((len(terms), 6))
+                to_axes[np.arange(len(terms)), self.channel[terms]] = size
+                out.append((effect, to_axes))
+        return out
+
+
+def errors_along(sized: Sequence[tuple[Effect, Floats]], motion: Motion) -> Floats:
+    """Sensor errors in b, without the regressors of all effects beside each other: those take most of the time.
+
+    Parameters
+    ----------
+    sized : sequence of (Effect, ndarray of shape (k, 6))
+        As `ImuModel.sized` gives them (rad/s, m/s^2).
+    motion : Motion
+        n cycles.
+
+    Returns
+    -------
+    ndarray, shape (n, 6)
+        As of `ImuModel.errors` (rad/s, m/s^2).
+    """
+    out = np.zeros((len(motion.t), 6))
+    for effect, to_axes in sized:
+        out += effect.regressors(motion) @ to_axes
+    return out
 
 
 _KNOWN = 1e-6

@@ -35,6 +35,7 @@ GYRO_MASS_UNBALANCE = register(
         "a torque. Direct acts about the axis of the force, quadrature about the other.",
         typical="DTG 0.1-2, optical gyros none, MEMS 1-100 deg/h/g",
         group=BASELINE,
+        linear=True,
         contained_in="gyro_g_sensitivity",
         confused_with=("gyro_bias",),
     )

@@ -50,6 +50,7 @@ GYRO_MISALIGNMENT = register(
         description="The input axes do not lie along the body axes. Seen when the table turns.",
         typical="navigation 0.1-1, tactical 1-5, MEMS 10-120 arcmin",
         group=BASELINE,
+        linear=True,
         gauge=True,
         confused_with=("accel_misalignment",),
     )
@@ -69,6 +70,7 @@ ACCEL_MISALIGNMENT = register(
         "together with the gyros' and are a matter of definition (doc/conventions.md).",
         typical="navigation 0.1-1, tactical 1-5, MEMS 10-120 arcmin",
         group=BASELINE,
+        linear=True,
         gauge=True,
         confused_with=("gyro_misalignment",),
     )

@@ -21,6 +21,7 @@ GYRO_SCALE = register(
         description="Relative error of the gyro's output per unit of rate. Seen in turns, not at rest.",
         typical="navigation 5-150, tactical 100-500, MEMS 1000-30000 ppm",
         group=BASELINE,
+        linear=True,
     )
 )
 
@@ -38,5 +39,6 @@ ACCEL_SCALE = register(
         "looks the same on all three axes.",
         typical="navigation 10-150, tactical 100-500, MEMS 1000-30000 ppm",
         group=BASELINE,
+        linear=True,
     )
 )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.alignment import Alignment, align, azimuth_of
+from sdimu_calibration.core.alignment.alignment import align, azimuth_of
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
@@ -29,13 +29,14 @@ from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
-from sdimu_calibration.core.filter.passes import Pass, one_pass, pass_input, pass_settings
+from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_input, pass_settings
+from sdimu_calibration.core.filter.passes import motion_about, one_pass
 from sdimu_calibration.core.matrix3 import put
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
+from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.rotation import rotation_vector
-from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass, firm_setup, second_order_pass
 from sdimu_calibration.core.side_by_side import side_by_side
 
 if TYPE_CHECKING:
@@ -170,33 +171,45 @@ def refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
         Attitude at the start of the part (dimensionless), by the fit of the whole.
     """
     alignment = first_attitude(seen.epochs, seen.phases, fit.setup)
-    estimate, before, near = fit.estimate, np.inf, None
+    estimate, before, firm = fit.estimate, np.inf, firm_setup(fit.setup)
     for count in range(_MOST_PASSES):
-        done = _one_pass(fit, seen, alignment, C_nb, estimate, near)
+        done = one_pass(seen, firm, alignment, np.ascontiguousarray(C_nb), estimate)
         moved = float(np.max(np.abs(done.estimate - estimate) / np.sqrt(np.diag(done.covariance))))
         # The first movement also holds what the part does not know of the whole: of at most a sigma, a share is left.
         if count and moved**2 < CONVERGED * min(before, 1.0):
             return Refit(fit, done.estimate, done.covariance)
-        estimate, C_nb, before, near = done.estimate, done.smoothed_start, moved, done.data.values
+        estimate, C_nb, before = done.estimate, done.smoothed_start, moved
     own = fit.on(seen, C_nb)
     return Refit(own, own.estimate, own.estimate_covariance)
 
 
-def _one_pass(
-    fit: NavigationFit, seen: PreparedData, alignment: Alignment, C_nb: Floats, estimate: Floats, near: Floats | None
-) -> Pass | SecondOrderPass:
-    """Make one pass, of the kind that the fit makes, from an attitude (3, 3) and coefficients (q,).
+def compensated(
+    setup: TestSetup, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float
+) -> Compensated:
+    """Take the errors of the sensors out of all cycles, exactly.
 
-    `near` (n, m) are the regressors of the pass before, where there is one.
+    Parameters
+    ----------
+    estimate : ndarray, shape (q,)
+        Coefficients of the estimator (SI).
+    C_start : ndarray, shape (3, 3)
+        Attitude at the start, b to n.
+    end_of_fit : float
+        Where the fit ended (s): a coefficient that fades is known there, and fades away from there.
     """
-    setup = fit.setup
-    if isinstance(fit.last, SecondOrderPass):
-        return second_order_pass(seen, firm_setup(setup), alignment, C_nb, estimate)
-    # What fades is known at the end of a pass, not at the start of the next one.
-    constant = setup.sensors.decay_rate == 0.0
-    return one_pass(
-        seen, setup, alignment, np.ascontiguousarray(C_nb), estimate * constant, closed_loop=False, near=near
+    sensors = setup.sensors
+    constant = estimate * (sensors.decay_rate == 0.0)
+    near = motion_about(prepared, setup, C_start, constant)
+    clean = correct_cycles(prepared.cycles, near, sensors, constant)
+    values, channel, parameter = spread(
+        sensors.regressors(clean.seen), sensors.channel, sensors.parameter, clean.weight
     )
+    cycles, fading = clean.cycles, estimate - constant
+    if fading.any():
+        left = np.exp(-np.outer(np.abs(clean.seen.t - end_of_fit), sensors.decay_rate[parameter]))
+        errors = (values * left * fading[parameter]) @ np.eye(6)[channel] * cycles.dt[:, None]
+        cycles = replace(cycles, alpha=cycles.alpha - errors[:, :3], upsilon=cycles.upsilon - errors[:, 3:])
+    return Compensated(cycles, values, channel, parameter)
 
 
 def free_navigation(
@@ -217,7 +230,7 @@ def free_navigation(
     cycles, terms = until.cycles, None
     if seen is not None:
         end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
-        terms = seen.fit.compensated(until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
+        terms = compensated(seen.fit.setup, until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
         cycles = terms.cycles
     clean = part(replace(until, cycles=cycles), segment.first, segment.last)
     levelling = segment.start - segment.first

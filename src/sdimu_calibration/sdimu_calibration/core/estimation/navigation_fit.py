@@ -1,8 +1,7 @@
-"""Fits that navigate, whatever passes they make: what they say of coefficients, drifts, noise and prediction."""
+"""The fit by navigation: what it says of coefficients, drifts, noise and prediction."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
@@ -10,14 +9,18 @@ from typing import Any, Self
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, stops_line
+from sdimu_calibration.core.alignment.alignment import UNKNOWN_AZIMUTH, Alignment
+from sdimu_calibration.core.alignment.coarse_alignment import StartPoint
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, stops_line
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.data.imu_class import understated_noise
-from sdimu_calibration.core.effects import bias
+from sdimu_calibration.core.effects import bias, earth_rate
+from sdimu_calibration.core.effects.accelerometer_frame import AccelerometerFrameModel
 from sdimu_calibration.core.effects.effect import Effect, Timetable
+from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH, azimuth_note, azimuth_warning
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, conditions, counts_of
-from sdimu_calibration.core.estimation.free_inertial import Compensated, FreeInertialRun, free_inertial_runs
+from sdimu_calibration.core.estimation.fit_words import MISFIT, in_noise_in_words, stated_priors
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.estimation.site_rows import at_site, with_found
@@ -26,35 +29,36 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
     KnownPass,
     NavigationEvidence,
+    known_pass,
     navigation_evidence,
     timetable,
 )
 from sdimu_calibration.core.evidence.stop_misfit import stop_misfit
-from sdimu_calibration.core.filter.filter_pass import PassOutput
-from sdimu_calibration.core.filter.passes import Pass, Solution
+from sdimu_calibration.core.filter.bend import Bend, bend
+from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.pass_loop import Pass
+from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_settings
+from sdimu_calibration.core.filter.passes import one_pass
+from sdimu_calibration.core.filter.solution import Solution
+from sdimu_calibration.core.filter.solution import solve as solve_passes
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
 from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect, unexplained
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.plain_text import counted
+from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History
-from sdimu_calibration.core.second_order.bend import Bend
-from sdimu_calibration.core.second_order.second_order_passes import SecondOrderPass
 from sdimu_calibration.core.side_by_side import side_by_side
 from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.wording import Option, Work
 
+FILTER = "filter"
+"""Name of the estimator."""
 HELD_OUT_FOLDS = 3
 """Number of interleaved groups of stops, each held out once: two thirds of the stops are then in every fit."""
 _ABSURD = 1e3
 """NIS per degree of freedom (1) from which there is no fit at all: units, axes or site are wrong."""
-MISFIT = 1.2
-"""NIS per degree of freedom, and held-out error (sigma), from which a user is warned: 1 is right, and chance stays
-within a few per cent of it."""
-_FAST = 3.0
-"""NIS per degree of freedom (1) in learned noise from which sigmas are too small: in flicker errors are 1.0 of them at
-2, 1.2 at 4.5 and 3.8 at 12 (twelve tests of a FOG)."""
 _NOISY = 4.0
 """NIS per degree of freedom (1) from which the rests are looked at: noise of twice the stated size is possible."""
 _OF_THE_PASSES = ("bend", "known", "bare", "timetable", "wander", "centring", "_drifts", "_share_of_rest", "_held_out")
@@ -68,17 +72,19 @@ NO_FIELD = (
 
 @dataclass(frozen=True)
 class NavigationFit(Fit):
-    """A fit by navigation."""
+    """A fit by passes of the navigation filter about exactly corrected samples."""
 
     setup: TestSetup
     """With the sensor model of the estimator, q coefficients."""
     prepared: PreparedData
     alignment: Alignment
-    solution: Solution[Pass] | Solution[SecondOrderPass]
+    solution: Solution
+    frame_model: AccelerometerFrameModel
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
     """Noise with a memory that was learned; None where white noise was taken."""
     carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
     """Cached properties that a fit by the same passes knows already."""
+    estimator = FILTER
 
     def __post_init__(self, carried: Mapping[str, Any] | None) -> None:
         """Keep what is known."""
@@ -86,7 +92,29 @@ class NavigationFit(Fit):
             object.__setattr__(self, name, value)
 
     @property
-    def last(self) -> Pass | SecondOrderPass:
+    def azimuth_free(self) -> bool:  # type: ignore[override]
+        """Whether the horizontal Earth rate is estimated in the place of the azimuth."""
+        return earth_rate.EAST in self.setup.sensors.names
+
+    @property
+    def body_frame(self) -> str:
+        """Frame that the model asks for."""
+        return self.model.body_frame
+
+    def reported_values(self, settled: Floats) -> Floats:
+        """Read the coefficients asked for out of those of the estimator."""
+        return self.frame_model.values(settled)
+
+    def reported_covariance(self, settled: Floats) -> Floats:
+        """Read a covariance out of that of the estimator."""
+        return self.frame_model.covariance(settled, self.settled)
+
+    def added_columns(self, count: int) -> Ints:
+        """Columns in `evidence`, which is that of the inner model, of the last `count` parameters of the model."""
+        return self.frame_model.place[len(self.names) - count :]
+
+    @property
+    def last(self) -> Pass:
         """The last pass."""
         return self.solution.last
 
@@ -116,22 +144,11 @@ class NavigationFit(Fit):
         """
         return self.reported_covariance(self.settled_covariance)
 
-    @property
-    @abstractmethod
+    @cached_property
     def known(self) -> KnownPass:
         """Navigation with the coefficients known at their final values."""
+        return known_pass(self.prepared, self.setup, self.alignment, self.last)
 
-    @abstractmethod
-    def run_kinds(self, kind: Ints) -> PassOutput:
-        """Repeat the last pass with other kinds of measurement.
-
-        Parameters
-        ----------
-        kind : ndarray of int, shape (e,)
-            As in `measurement_kind`.
-        """
-
-    @abstractmethod
     def on(self, prepared: PreparedData, C_nb: Floats) -> NavigationFit:
         """Fit the same model to a part of the recording.
 
@@ -140,20 +157,13 @@ class NavigationFit(Fit):
         C_nb : ndarray, shape (3, 3)
             Attitude at its start, b to n (dimensionless).
         """
-
-    @abstractmethod
-    def compensated(self, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float) -> Compensated:
-        """Take the errors of the sensors out of all cycles.
-
-        Parameters
-        ----------
-        estimate : ndarray, shape (q,)
-            Coefficients of the estimator (SI).
-        C_start : ndarray, shape (3, 3)
-            Attitude at the start, b to n.
-        end_of_fit : float
-            Where the fit ended (s): a coefficient that fades is known there.
-        """
+        begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
+        alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
+        alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
+        solution = solve_passes(self.setup, prepared, alignment, begin, silent)
+        return replace(
+            self, setup=solution.setup, prepared=prepared, alignment=alignment, solution=solution, noise=None
+        )
 
     @property
     def estimate(self) -> Floats:
@@ -167,7 +177,7 @@ class NavigationFit(Fit):
         What is reported follows from these.
         """
         best = self.estimate if self.noise is None else self.estimate + self.noise.deviation
-        best = self.centring @ (best if self.bend is None else best + self.bend.mean)
+        best = self.centring @ (best + self.bend.mean)
         return best if self.moved is None else best + self.moved
 
     @property
@@ -175,13 +185,19 @@ class NavigationFit(Fit):
         """Covariance of `settled`, shape (q, q)."""
         T = self.centring
         C = self.estimate_covariance if self.noise is None else self.noise.covariance
-        C = C if self.bend is None else C + self.bend.covariance
+        C = C + self.bend.covariance
         return np.asarray(T @ (C if self.doubt is None else C + self.doubt) @ T.T)
 
-    @property
-    def bend(self) -> Bend | None:
-        """What squares of coefficients that only priors decide add; None where squares do not count."""
-        return None
+    @cached_property
+    def bend(self) -> Bend:
+        """What the squares of coefficients that only priors decide add to mean and covariance."""
+
+        def about(reference: Floats) -> tuple[Floats, Floats]:
+            at = one_pass(self.prepared, firm, self.alignment, last.smoothed_start, reference)
+            return at.estimate, at.covariance
+
+        last, firm = self.last, firm_setup(self.setup)
+        return bend(self.setup.sensors, last.estimate, last.covariance, about)
 
     @property
     def covariance_at_site(self) -> Floats:
@@ -216,8 +232,7 @@ class NavigationFit(Fit):
     def _drifts(self) -> dict[str, tuple[int, float]]:
         """Channel of each drift of a bias, and the mean of its regressor over all dwells (SI)."""
         out = {}
-        drifting = [effect for effect in self.setup.sensors.effects if effect.bias_drift]
-        for effect in drifting:
+        for effect in (effect for effect in self.setup.sensors.effects if effect.bias_drift):
             for mean, term in zip(self.dwell_means(effect).tolist(), effect.terms, strict=True):
                 out[effect.parameters[term.parameter].name] = (term.channel, mean)
         return out
@@ -246,10 +261,8 @@ class NavigationFit(Fit):
             As the attribute `moved` (SI).
         """
         more = len(self.setup.sensors.names)
-        if doubt is not None:
-            doubt = np.pad(doubt, (0, more - len(doubt)))
-        if moved is not None:
-            moved = np.pad(moved, (0, more - len(moved)))
+        doubt = None if doubt is None else np.pad(doubt, (0, more - len(doubt)))
+        moved = None if moved is None else np.pad(moved, (0, more - len(moved)))
         return replace(self, doubt=doubt, moved=moved, carried=self._of_the_passes())
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
@@ -332,7 +345,11 @@ class NavigationFit(Fit):
         kind = self.prepared.kind.copy()
         kind[out & (kind == SENSORS)] = HELD_SENSORS
         kind[out & (kind == ALL)] = HELD_ALL
-        return self.run_kinds(kind).normalised
+        last = self.last
+        state = PassState(*(v.copy() for v in last.start))
+        output = new_output(len(kind), len(self.estimate), False, len(kind))
+        run_pass(last.data._replace(kind=kind), pass_settings(firm_setup(self.setup), closed_loop=False), state, output)
+        return output.normalised
 
     def evidence(self, effects: Sequence[Effect] = ()) -> NavigationEvidence:
         """Whitened innovations about this fit and the signatures of its parameters and those of `effects`."""
@@ -370,25 +387,21 @@ class NavigationFit(Fit):
         return counts_of(self.test.recording, self.prepared.cycles.lost, stops, conditions(self.setup), against)
 
     def notes(self) -> tuple[str, ...]:
+        """List the stops that were found, and those held out; name an azimuth that is not observable."""
+        heading = NO_AZIMUTH if self.azimuth_free else azimuth_note(self.solution)
+        return (*self.notes_on_data(), *((heading,) if heading else ()))
+
+    def notes_on_data(self) -> tuple[str, ...]:
         """List the stops that were found, and those held out."""
         held = self.test.held_out
         told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
         spans = ", ".join(f"{begin:g}-{end:g}" for begin, end in self.test.excluded)
-        told = (*told, *((f"times held out of the fit (s): {spans}",) if spans else ()), *self._stated_priors())
+        told = (*told, *((f"times held out of the fit (s): {spans}",) if spans else ()), *stated_priors(self.model))
         noise = () if self.noise is None else (self.noise.note,)
         magnetic = any(effect.needs == "magnetic" for effect in self.sensors.effects)
         field = (NO_FIELD,) if magnetic and self.setup.site.magnetic_field_t is None else ()
         places = (r.note for r in self.references() if r.sigma)
         return (*stops_line(self.test.recording, self.prepared), *told, *places, *noise, *field)
-
-    def _stated_priors(self) -> tuple[str, ...]:
-        """Say which coefficients are fixed, and which have a prior of their own."""
-        fixed = [one.name for one in self.model.priors if one.sigma == 0.0]
-        other = [one.name for one in self.model.priors if one.sigma > 0.0]
-        return (
-            *((f"fixed by the model, not estimated: {', '.join(fixed)}",) if fixed else ()),
-            *((f"with a prior that the model states: {', '.join(other)}",) if other else ()),
-        )
 
     def contradiction(self, statistics: FitStatistics) -> str:
         """Say that there is no fit at all; empty where there is one."""
@@ -418,14 +431,16 @@ class NavigationFit(Fit):
         if any(figure is not None and figure > MISFIT for figure in judged):
             nis, held_out = statistics.nis_mean, statistics.held_out_rms
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            told = f"the model{white} does not fit ({text}{_in_noise(statistics)}){self._lost_in_words()}"
+            told = f"the model{white} does not fit ({text}{in_noise_in_words(statistics)}){self._lost_in_words()}"
             told += self._noise_in_words(nis)
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults], self.test.recording.notes):
             out.append(not_of_sensors(odd))
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
-        return (*out, *([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
+        more = (*([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
+        azimuth = "" if self.azimuth_free else azimuth_warning(self.solution)
+        return (*out, *more, *([azimuth] if azimuth else []))
 
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""
@@ -441,28 +456,25 @@ class NavigationFit(Fit):
         # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
         return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)
 
-    def _rows_of_history(self, rows: Ints, output: PassOutput, values: Floats, covariance: Floats) -> History:
-        """History at epochs (k,), with values (k, p) and covariance (k, p, p) in the frame of the report."""
-        phases = self.prepared.phases
+    def history(self) -> History:
+        """History of the last pass, at the epochs whose covariance was kept."""
+        last, phases = self.last, self.prepared.phases
+        out, T = last.output, self.centring
+        rows = np.arange(0, len(self.prepared.epochs), out.stride)
+        values = self.frame_model.values((last.reference + out.estimate[rows]) @ T.T)
+        covariance = self.frame_model.covariance(T @ out.covariance @ T.T, self.settled)
+        attitude = out.sigma[rows, 6:NAV]
+        if self.azimuth_free:
+            at = self.setup.sensors.names.index(earth_rate.EAST)
+            open_rad = np.minimum(out.sigma[rows, NAV + at] / self.setup.sensors.prior[at], 1.0) * UNKNOWN_AZIMUTH
+            attitude = np.column_stack([attitude[:, :2], np.hypot(attitude[:, 2], open_rad)])
         return History(
             self.prepared.epochs.end[rows],
             values,
             np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)),
-            output.sigma[rows, 6:9],
+            attitude,
             phases.stop[rows],
             phases.dwell[rows],
             phases.used[rows],
-            output.nis[rows],
+            out.nis[rows],
         )
-
-
-def _in_noise(statistics: FitStatistics) -> str:
-    """Say which figure is right at 1: that in learned noise where any was, with what is not in that noise."""
-    nis, held_out = statistics.nis_in_noise, statistics.held_out_in_noise
-    if nis is None or held_out is None:
-        return "; 1 is right"
-    if max(nis, held_out) <= MISFIT:
-        return f"; 1 is right; in noise that stands for what is missing they are {nis:.3f} and {held_out:.3f}"
-    fast = ": noise that moves within seconds is not in it" if nis > MISFIT else ""
-    small = ", so the sigmas are too small" if nis > _FAST else ""
-    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}, 1 is right{fast}{small}"

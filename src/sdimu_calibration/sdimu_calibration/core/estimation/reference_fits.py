@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.fit_words import MISFIT
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
-from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -107,7 +108,7 @@ class ReferenceFit(Fit):
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found."""
         # Not those of the passes: the passes only answer questions about these coefficients.
-        return NavigationFit.notes(self.about)
+        return self.about.notes_on_data()
 
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit of the least squares and at stops of the navigation about it; what is outside the specification."""

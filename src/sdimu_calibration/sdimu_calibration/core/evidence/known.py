@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.effect import OF_ONE_TIME, Effect
+from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 
@@ -104,6 +106,28 @@ def known_of(evidence: LinearEvidence, candidates: Ints, scatter: Sequence[float
         model = 1.0 / np.sqrt(evidence.weight[:p])
     prior = np.concatenate([model, evidence.prior[keep[p:] - first]])
     return Known(names, J[np.ix_(keep, keep)], prior, np.asarray(scatter if len(scatter) else np.zeros(len(keep))))
+
+
+def in_frame_of_priors(known: Known, asked: ImuModel) -> Known:
+    """Bring what is known in the accelerometers' frame into that of the priors, in which plans are judged.
+
+    Parameters
+    ----------
+    known : Known
+        As `known_of` gives it: without the misalignments that the accelerometers' frame makes zero.
+    asked : ImuModel
+        The model as it was asked for; one that has not all of these was estimated in the frame of its priors.
+    """
+    pinned = body_frame.pinned_names()
+    if not set(pinned) <= set(asked.names) or set(pinned) <= set(known.names):
+        return known
+    names = (*known.names, *pinned)
+    # The data say nothing of the turn of the frame.
+    F = body_frame.frame_jacobian(names, body_frame.FRAMES[0], by_temperature=False)[: len(known.names)]
+    sizes = dict(zip(known.names, known.prior.tolist(), strict=True))
+    sizes |= dict(zip(asked.names, asked.prior.tolist(), strict=True))
+    scatter = np.concatenate([known.scatter, np.zeros(len(pinned))])
+    return Known(names, F.T @ known.J @ F, np.array([sizes[name] for name in names]), scatter)
 
 
 def known_from(names: Sequence[str], covariance: Floats, prior: Floats, frame: Floats) -> Known:

@@ -1,8 +1,7 @@
 """Evidence of a navigation: whitened innovations, and the signature of every known and suspected parameter.
 
 The navigation filter runs once more with the coefficients known at their final values, so that only navigation errors
-are estimated. About the passes of the filter, samples are corrected to first order; about the second-order passes they
-are corrected exactly, and an effect shows in corrected samples through the inverse slope of the sensor errors.
+are estimated. An effect shows in corrected samples through the inverse slope of the sensor errors.
 """
 
 from __future__ import annotations
@@ -29,15 +28,10 @@ from sdimu_calibration.core.evidence.signatures import (
     measured_rows,
     signatures,
 )
-from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.passes import Pass, check_finite, pass_settings, start_state
-from sdimu_calibration.core.navigation.track import Correction, motion
-from sdimu_calibration.core.second_order.second_order_passes import (
-    SecondOrderPass,
-    firm_setup,
-    linearise,
-    run_linearised,
-)
+from sdimu_calibration.core.filter.filter_pass import NAV, PassOutput, PassState
+from sdimu_calibration.core.filter.pass_loop import Pass
+from sdimu_calibration.core.filter.pass_setup import firm_setup
+from sdimu_calibration.core.filter.passes import begun, linearise, run_linearised
 from sdimu_calibration.core.side_by_side import side_by_side
 
 _SHORTEST_DWELL_S = 3.0
@@ -57,8 +51,8 @@ class KnownPass:
     """With the matrices of every epoch."""
     seen: Motion
     """Motion along which it was linearised, n cycles."""
-    weight: Floats | None
-    """Shape (n, 6, 6). Change of corrected rate and force per change of the measured ones; None is the identity."""
+    weight: Floats
+    """Shape (n, 6, 6). Change of corrected rate and force per change of the measured ones."""
 
 
 @dataclass(frozen=True)
@@ -121,35 +115,15 @@ def timetable(prepared: PreparedData) -> Timetable:
     return Timetable(float(epochs.end[-1]), tuple(dwells), tuple(turns))
 
 
-def known_pass(prepared: PreparedData, setup: TestSetup, finished: Pass) -> KnownPass:
-    """Repeat the last pass of the filter with the coefficients known at their final values."""
-    p = len(setup.sensors.prior)
-    state = _with_known_coefficients(finished.start, p)._replace(used=finished.estimate.copy())
-    output = new_output(len(prepared.epochs), p, True, len(prepared.epochs), navigation_only=True)
-    run_pass(finished.data._replace(kind=prepared.kind), pass_settings(setup, closed_loop=False), state, output)
-    check_finite(state)
-    seen = motion(
-        prepared.cycles,
-        prepared.rest,
-        Correction(setup.sensors, finished.estimate, finished.data.values),
-        finished.C_start.copy(),
-        setup.around(prepared.temperature),
-        predicted=True,
-    )
-    return KnownPass(output, seen, None)
-
-
-def known_second_order_pass(
-    prepared: PreparedData, setup: TestSetup, start: Alignment, finished: SecondOrderPass
-) -> KnownPass:
+def known_pass(prepared: PreparedData, setup: TestSetup, start: Alignment, finished: Pass) -> KnownPass:
     """Run a pass about samples corrected exactly at the final coefficients, which are known.
 
     Shifts of the attitude between stops change no covariance, so the recursion of the signatures holds as it stands.
     """
     firm, estimate = firm_setup(setup), finished.estimate
     at = linearise(prepared, firm, finished.smoothed_start, estimate)
-    begin = start_state(firm, start, at.C_stop[0], estimate)._replace(used=np.zeros(len(estimate)))
-    done = run_linearised(at, firm, _with_known_coefficients(begin, len(estimate)), prepared, keep=True)
+    begin = _with_known_coefficients(begun(at, firm, start), len(estimate))
+    done = run_linearised(at, firm, begin, keep=True, navigation_only=True)
     return KnownPass(done.output, at.seen, at.weight)
 
 
@@ -169,7 +143,7 @@ def navigation_evidence(
     Parameters
     ----------
     estimate : ndarray, shape (p,)
-        Coefficients of the model (SI), at which `known` ran.
+        Coefficients of the model (SI), at which `known` ran; it ran without those that fade.
     effects : sequence of Effect
         Each of their parameters becomes a candidate.
     """
@@ -182,7 +156,7 @@ def navigation_evidence(
         stop=prepared.phases.stop[epoch],
         names=(*sensors.names, *(c.label for c in candidates)),
         weight=sensors.weight,
-        shift=sensors.mean - estimate,
+        shift=sensors.mean - estimate * (sensors.decay_rate == 0.0),
         stated=sensors.stated,
         candidates=candidates,
         prior=prior,

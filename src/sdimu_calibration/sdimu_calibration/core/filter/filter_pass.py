@@ -45,7 +45,7 @@ from sdimu_calibration.core.navigation.ins_errors import (
     transition,
 )
 from sdimu_calibration.core.navigation.strapdown import mean_attitude, navigate_cycle, velocity_increment
-from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, skew
+from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector, skew
 
 NAV = 9
 """Number of navigation error states: position, velocity, attitude."""
@@ -82,6 +82,10 @@ class PassInput(NamedTuple):
     channel: Ints
     parameter: Ints
     """`channel`, `parameter`: sensor axis and coefficient of each regressor, shape (m,)."""
+    shift: Ints
+    """Stop to whose attitude navigation goes before the epoch, -1 where it goes on as it is, shape (e,)."""
+    C_stop: Floats
+    """Attitude about which each of k stops is linearised, b to n (dimensionless), shape (k, 3, 3)."""
 
 
 class PassSettings(NamedTuple):
@@ -219,13 +223,16 @@ def _navigate_epoch(
     T = 0.0
     first, count = data.first[e], data.last[e] - data.first[e]
     dts = data.dt[first : data.last[e]]
+    error[:] = 0.0
+    corrected = not state.used.any()
     for k in range(count):
         c = first + k
         dt = dts[k]
         T += dt
-        error[:] = 0.0
-        for j in range(data.channel.shape[0]):
-            error[data.channel[j]] += data.values[c, j] * state.used[data.parameter[j]]
+        if not corrected:
+            error[:] = 0.0
+            for j in range(data.channel.shape[0]):
+                error[data.channel[j]] += data.values[c, j] * state.used[data.parameter[j]]
         for i in range(3):
             alpha[i] = data.alpha[c, i] - error[i] * dt
             upsilon[i] = data.upsilon[c, i] - error[3 + i] * dt
@@ -322,6 +329,18 @@ def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
 
 
 @compiled
+def _go_on_from(C_nb: Floats, state: PassState) -> None:
+    """Go on from the attitude `C_nb` (3, 3), in place: the attitude error is counted from there.
+
+    No half product of shift and error is added as after a reset of a closed loop: the rows of Zf know no second order,
+    so an error in them is the tilt as it is seen, whatever the azimuth, and tilts so seen add. With the half product
+    every shift says something about azimuth that no sample said.
+    """
+    state.x[6:9] -= rotation_vector(sparse_product(C_nb, state.C_nb.T))
+    put(orthonormal(C_nb), state.C_nb, 0, 0)
+
+
+@compiled
 def _restart(settings: PassSettings, state: PassState) -> None:
     """Begin the navigation anew from the known point, at rest, in place; attitude and coefficients stay."""
     for i in range(3):
@@ -411,6 +430,8 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
     f_n = f_cycles[0]
     keep, kept, g = out.Phi.shape[0] > 0, out.H.shape[2], out.G.shape[2]
     for e in range(data.first.shape[0]):
+        if data.shift[e] >= 0:
+            _go_on_from(data.C_stop[data.shift[e]], state)
         if data.restart[e]:
             _restart(settings, state)
         position, velocity = state.position.copy(), state.velocity.copy()

@@ -12,7 +12,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
-from sdimu_calibration.core.filter.passes import ROOM, held_back
+from sdimu_calibration.core.filter.solution import ROOM, held_back
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.shared_function import is_weight

@@ -14,13 +14,13 @@ from sdimu_calibration.core.diagnosis.measured_noise import measured_noise
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import told_apart
+from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.estimation.second_order_fit import NO_AZIMUTH
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
@@ -171,7 +171,7 @@ def fitted(job: Job) -> Fit:
     if job.about is None or test.why_handheld or job.estimator == HandheldFit.estimator:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
-    fit = fit_about(test, model, job.estimator, _untagged(job.about, job.member.name), job.start)
+    fit = fit_about(test, model, _untagged(job.about, job.member.name), job.start)
     if job.noise is None:
         return fit if job.function else with_noise_learned(fit)
     evidence = fit.bare

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.effects import body_frame
+from sdimu_calibration.core.effects.accelerometer_frame import are_large
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
-from sdimu_calibration.core.estimation.second_order_fit import SecondOrderFit
 from sdimu_calibration.core.estimation.solve import AUTO, with_effects
-from sdimu_calibration.core.filter.passes import MOST_WIDENINGS
+from sdimu_calibration.core.filter.solution import MOST_WIDENINGS
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
 from sdimu_calibration.core.joint.member import Job, Member, Report, fitted
@@ -181,7 +182,7 @@ def fit_set(
     check_one_grade(reports)
     check_one_site(reports)
     doubt = check_one_unit(reports) if before is None else before.unit_doubt
-    reports = _one_estimator(members, options, reports, run)
+    _check_one_frame(options.model, reports)
     firm, late = [r for r in reports if r.stands_alone], {}
     if firm and before is None:
         # Where a recording alone may end is no place to linearise it; what the others know of the unit is.
@@ -331,19 +332,16 @@ def with_own(fresh: Report, old: Report | None) -> Report:
     )
 
 
-def _one_estimator(members: Sequence[Member], options: SetOptions, reports: Sequence[Report], run: Run) -> list[Report]:
-    """Repeat the recordings of the filter by second-order passes where others need them: one frame for all."""
-    kinds = {r.estimator for r in reports}
-    if len(kinds) == 1 or kinds <= {HandheldFit.estimator, SecondOrderFit.estimator}:
-        return list(reports)
-    by_name = {m.name: m for m in members}
-    wanted = [r for r in reports if r.estimator not in {HandheldFit.estimator, SecondOrderFit.estimator}]
-    fresh = run([job_of(by_name[r.name], options, None, SecondOrderFit.estimator) for r in wanted])
-    for report in fresh:
-        if isinstance(report, DataError):
-            raise report
-    new = {r.name: r for r in fresh if isinstance(r, Report)}
-    return [new.get(r.name, r) for r in reports]
+def _check_one_frame(model: Model, reports: Sequence[Report]) -> None:
+    """Refuse runs by hand beside recordings on a table where the model leaves these in another frame."""
+    by_hand = [r.estimator == HandheldFit.estimator for r in reports]
+    labels = {label for effect in model.effects for label in resolve(effect).labels}
+    turns = model.body_frame == body_frame.FRAMES[0] and set(body_frame.pinned_names()) <= labels
+    if any(by_hand) and not all(by_hand) and not turns:
+        raise DataError(
+            "recordings by hand and on a table share the accelerometers' frame alone: add accel_misalignment to the "
+            f"model, and leave body_frame at {body_frame.FRAMES[0]}"
+        )
 
 
 def joint_names(reports: Sequence[Report]) -> tuple[str, ...]:
@@ -466,7 +464,7 @@ def _moved(fit: SetFit, name: str) -> bool:
     # Weights of a function are linear anywhere.
     kept = [k for k, n in enumerate(own.names) if not is_weight(n)]
     far = np.abs(np.array([values[own.names[k]] for k in kept]) - own.point[kept])
-    if report.estimator == SecondOrderFit.estimator or not report.stands_alone:
+    if are_large(own.names, own.weight) or not report.stands_alone:
         places = [fit.names.index(own.names[k]) for k in kept]
         sigma = np.sqrt(np.diag(fit.estimate.covariance)[places])
         return bool(np.any(far > _NEAR * sigma))

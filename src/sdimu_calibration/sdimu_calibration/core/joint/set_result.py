@@ -11,7 +11,8 @@ from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.averaged import none_below_zero
 from sdimu_calibration.core.effects.references import SITE_REFERENCES, told_of
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.navigation_fit import MISFIT, NavigationFit
+from sdimu_calibration.core.estimation.fit_words import MISFIT
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import not_of_sensors
 from sdimu_calibration.core.estimation.outcome import doubted, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.evidence.candidate import Candidate
-from sdimu_calibration.core.evidence.known import Standing, class_of, is_lasting, known_of
+from sdimu_calibration.core.evidence.known import Standing, class_of, in_frame_of_priors, is_lasting, known_of
 from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
 
@@ -41,7 +42,8 @@ def set_standing(
             classes.append(tuple(c.label for c in members))
             labels |= dict.fromkeys(classes[-1])
             more |= {c.label: place[c.label] for c in members[1:] if c.label not in kept}
-    known = known_of(evidence, np.array(list(more.values()), dtype=np.int64))
+    own_frame = known_of(evidence, np.array(list(more.values()), dtype=np.int64))
+    known = in_frame_of_priors(own_frame, imu_model.build(fit.model.effects, fit.reports[0].imu))
     sizes = dict.fromkeys((n for own in fit.varying.values() for n in own), math.inf)
     for t, own in zip(fit.turn_on, fit.varying.values(), strict=False):
         sizes |= dict.fromkeys(own, t.sigma)

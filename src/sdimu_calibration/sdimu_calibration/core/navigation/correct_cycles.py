@@ -17,8 +17,8 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.effects.error_slope import error_slope
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.error_slope import error_slope, slope_is_constant
+from sdimu_calibration.core.effects.imu_model import ImuModel, errors_along
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.strapdown import Cycles
 
@@ -45,11 +45,12 @@ def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: 
         Near the true motion of the same cycles.
     coefficients : ndarray, shape (p,)
     """
-    slope = error_slope(model, seen, slice(None), coefficients)
-    weight: Floats = np.asarray(np.linalg.inv(np.eye(6) + slope), dtype=np.float64)
+    rows = slice(0, 1) if slope_is_constant(model, coefficients) else slice(None)
+    inverse = np.linalg.inv(np.eye(6) + error_slope(model, seen, rows, coefficients))
+    weight = np.ascontiguousarray(np.broadcast_to(inverse, (len(cycles), 6, 6)))
     dt = cycles.dt[:, None]
     near = np.hstack([seen.w, seen.f])
-    defect = np.hstack([cycles.alpha, cycles.upsilon]) / dt - near - model.errors(model.regressors(seen), coefficients)
+    defect = np.hstack([cycles.alpha, cycles.upsilon]) / dt - near - errors_along(model.sized(coefficients), seen)
     true = near + np.einsum("kij,kj->ki", weight, defect)
     corrected = replace(
         cycles,

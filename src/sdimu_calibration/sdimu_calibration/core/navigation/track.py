@@ -10,7 +10,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.compiled import compiled
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.imu_model import ImuModel, errors_along
 from sdimu_calibration.core.effects.motion import NO_PAST, Motion
 from sdimu_calibration.core.matrix3 import elements, multiplied, orthonormal3, rotation3, store
 from sdimu_calibration.core.navigation.strapdown import Cycles
@@ -117,8 +117,8 @@ class Correction:
     model: ImuModel
     coefficients: Floats
     """Of the model (SI), shape (p,)."""
-    near: Floats | None = None
-    """Shape (n, m). Regressors along nearly the same motion: the compensation begins with them."""
+    rounds: int = _COMPENSATIONS
+    """At most; what they leave is the size of the sensor errors to this power, plus one, of the rate."""
 
 
 def motion(
@@ -157,9 +157,9 @@ def motion(
     w_measured, f_measured = cycles.alpha / dt[:, None], cycles.upsilon / dt[:, None]
     heat, heat_rate = temperatures(around.temperature, cycles.t - 0.5 * dt, causal)
     C0 = C_start.copy()
-    model, coefficients, near = correction.model, correction.coefficients, correction.near
-    rounds = _COMPENSATIONS if np.any(coefficients) else 0
-    error = model.errors(near, coefficients) if rounds and near is not None else np.zeros((len(dt), 6))
+    sized = correction.model.sized(correction.coefficients)
+    rounds = correction.rounds if sized else 0
+    error = np.zeros((len(dt), 6))
     earlier = _AtStart.of(before)
     past = NO_PAST if before is None else before.left
     w_ie = earth.earth_rate(around.latitude)
@@ -191,7 +191,7 @@ def motion(
         )
         if done == rounds:
             break
-        taken, error = error, model.errors(model.regressors(seen), coefficients)
+        taken, error = error, errors_along(sized, seen)
         if (np.abs(error - taken) <= _SAME).all():
             break
     C_start[:, :] = C

@@ -16,10 +16,12 @@ from sdimu_calibration.core.alignment.alignment import Alignment
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, reduce, set_up
 from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.effects.accelerometer_frame import as_asked
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.passes import Solution, one_pass
+from sdimu_calibration.core.filter.passes import one_pass
+from sdimu_calibration.core.filter.solution import Solution
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.nominal import nominal_recording
@@ -143,15 +145,7 @@ def predict(
     nominal = prepare(plan, site, imu, model, mount_rad, noise)
     setup = nominal.setup
     sensors, frame = setup.sensors, setup.model.body_frame
-    done = one_pass(
-        nominal.prepared,
-        setup,
-        nominal.start,
-        nominal.start.C_nb,
-        np.zeros(len(sensors.prior)),
-        closed_loop=False,
-        keep=False,
-    )
+    done = one_pass(nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(sensors.prior)))
     J = body_frame.frame_jacobian(sensors.names, frame)
     output, epochs = done.output, nominal.prepared.epochs
     rows = np.arange(0, len(epochs), output.stride)
@@ -161,9 +155,11 @@ def predict(
     terms = () if noise is not None else stated_noise(imu)
     in_noise = sigma
     if terms:
-        solution = Solution(setup, nominal.prepared, nominal.start, done, done, 1, converged=True)
+        solution = Solution(setup, nominal.prepared, nominal.start, done, 1, converged=True)
         test = PreparedTest(nominal.recording, imu, site)
-        fit = FilterFit(test, model, sensors, setup, nominal.prepared, nominal.start, solution)
+        fit = NavigationFit(
+            test, model, sensors, setup, nominal.prepared, nominal.start, solution, as_asked(sensors, frame)
+        )
         in_noise = np.sqrt(np.diag(J @ covariance_in(fit, terms) @ J.T))
     limit = np.full(len(sigma), np.nan)
     if bound is not None:

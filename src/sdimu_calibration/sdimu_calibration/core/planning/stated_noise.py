@@ -7,13 +7,13 @@ The covariance is that of the fit of a real test in such noise (`estimation.nois
 from __future__ import annotations
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.estimation.filter_fit import FilterFit
+from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.noise_term import NoiseTerm
 
 
-def covariance_in(fit: FilterFit, terms: tuple[NoiseTerm, ...]) -> Floats:
+def covariance_in(fit: NavigationFit, terms: tuple[NoiseTerm, ...]) -> Floats:
     """Covariance of the coefficients of a fit in noise of these terms, biases as means over the test.
 
     Shape (p, p), in the frame of the prior (SI).

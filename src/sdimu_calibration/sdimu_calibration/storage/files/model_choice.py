@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS
+from sdimu_calibration.core.estimation.solve import AUTO, ESTIMATORS, OLDER_NAMES
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.storage.files.effect_file import extended_model
@@ -14,12 +14,12 @@ TABLE_MODEL, HANDHELD_MODEL = "baseline", "hand"
 """Models that are taken where the user names none."""
 HANDHELD = "handheld"
 """The estimator that navigates nothing."""
-_ESTIMATOR_ALIASES = {"hand": HANDHELD}
+_ESTIMATOR_ALIASES = {"hand": HANDHELD, **OLDER_NAMES}
 _MODEL_ALIASES = {HANDHELD: HANDHELD_MODEL}
 
 
 def named_estimator(word: str, option: str = "estimator") -> str:
-    """Return the estimator that `word` means, ``auto`` included; ``hand`` means ``handheld``."""
+    """Return the estimator that `word` means, ``auto`` included; ``hand`` and ``second-order`` are other names."""
     name = _ESTIMATOR_ALIASES.get(word, word)
     if name not in (AUTO, *ESTIMATORS):
         raise DataError(f"{option} {word}: expected one of {', '.join((AUTO, *ESTIMATORS))}")

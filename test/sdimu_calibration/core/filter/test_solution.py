@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.filter.passes import held_back
+from sdimu_calibration.core.filter.solution import held_back
 
 
 def estimated(data, sigma, prior):

@@ -1,4 +1,4 @@
-"""What the second-order passes see of the temperature's rate and of the angular acceleration: both about the cycle."""
+"""What the passes see of the temperature's rate and of the angular acceleration: both about the cycle."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from sdimu_calibration.core.alignment.prepared import reduce, set_up
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.filter.passes import linearise
 from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.planning.nominal import nominal_recording
 from sdimu_calibration.core.recording import TemperatureLog
-from sdimu_calibration.core.second_order.second_order_passes import linearise
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
@@ -37,7 +37,7 @@ def perfect(three_stops, site, model):
     return reduce(recording, setup, screened=False), setup
 
 
-def test_second_order_passes_see_the_rates_that_the_passes_of_the_filter_see(perfect):
+def test_passes_see_the_rates_about_the_cycle(perfect):
     prepared, setup = perfect
     nothing = np.zeros(len(setup.sensors.prior))
     seen = linearise(prepared, setup, np.eye(3), nothing).seen
@@ -96,7 +96,6 @@ def warming():
 def test_the_true_model_gives_an_effect_of_the_temperature_rate_its_size(warming, site, seed):
     base = load_model("baseline")
     fit = solve(warming(site, seed), replace(base, effects=(*base.effects, RATE)), learn=False)
-    assert fit.estimator == "second-order"
     value, sigma = (dict(zip(fit.names, v, strict=True))[RATE] for v in (fit.values, np.sqrt(np.diag(fit.covariance))))
     size = to_si(SIZE, "ug*min/degC")
     assert size > 20.0 * sigma

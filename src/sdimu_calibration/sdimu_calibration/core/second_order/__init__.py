@@ -1,1 +1,0 @@
-"""The estimator for errors of percents, whose squares count."""
