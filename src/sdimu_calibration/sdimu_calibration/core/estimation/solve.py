@@ -51,6 +51,8 @@ from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.wording import Option, Work
 
 AUTO = "auto"
+_NO_NOISE = "the fit diverged: its innovations are so far from the stated noise that no noise explains them"
+"""Why a fit that stands is refused: no sigma of it means anything."""
 _HIDDEN = "the noise that was learned hides the azimuth, and its passes do without one"
 """Why the fit does without an azimuth, which nobody asked for."""
 
@@ -90,22 +92,27 @@ def solve(
     make = _free_azimuth if azimuth_free else ESTIMATORS[choice.estimator]
     try:
         fit = replace(make(test, model, start, progress), reason=choice.reason)
+        if not learn:
+            return fit
+        found = noise_of(fit)
     except DivergedError as error:
-        noise = understated_noise(test.recording, test.imu, test.known_imus)
-        stated = ", ".join(one.name for one in model.priors)
-        cause = (f"; {noise}" if noise else "") + (
-            f"; check the priors that the model states: {stated}" if stated else ""
-        )
-        assumed = f" (no site was stated: {test.assumed_site} was assumed)" if test.assumed_site else ""
-        raise DivergedError(f"{error}{cause}{assumed}") from error
-    if not learn:
-        return fit
-    found = noise_of(fit)
+        raise DivergedError(f"{error}{_likely_cause(test, model)}") from error
+    except np.linalg.LinAlgError as error:
+        # Innovations of a hundred sigma: their squares leave the information on noise no digits.
+        raise DivergedError(f"{_NO_NOISE}{_likely_cause(test, model)}") from error
     if found.terms and isinstance(fit, NavigationFit) and azimuth_is_lost(fit, found.terms):
         # Without a start: the fit is then the same whichever fit came before it.
         fit = replace(_free_azimuth(test, model, None, progress), reason=_HIDDEN)
         found = noise_of(fit)
     return found.taken_by(fit)
+
+
+def _likely_cause(test: PreparedTest, model: Model) -> str:
+    """Say what may be wrong where a fit diverges, as the end of a sentence."""
+    noise = understated_noise(test.recording, test.imu, test.known_imus)
+    stated = ", ".join(one.name for one in model.priors)
+    cause = (f"; {noise}" if noise else "") + (f"; check the priors that the model states: {stated}" if stated else "")
+    return cause + (f" (no site was stated: {test.assumed_site} was assumed)" if test.assumed_site else "")
 
 
 def _check(test: PreparedTest, model: Model, estimator: str) -> None:
