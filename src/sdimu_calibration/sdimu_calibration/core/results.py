@@ -32,7 +32,7 @@ NO_AXES = (float("nan"),) * 3
 
 @dataclass(frozen=True)
 class History:
-    """The closed-loop filter as the test went on, one row an epoch (m), in the reported body frame."""
+    """The last pass as the test went on, one row an epoch (m), in the reported body frame."""
 
     t: Floats
     """End of the epoch (s), shape (m,)."""
@@ -192,7 +192,7 @@ class Calibration:
     notes : tuple of str
         What the user should know, one line each.
     history : History
-        Of the first, closed-loop pass.
+        Of the last pass.
     warnings : tuple of str
         Those of the notes that say that the estimate is not to be trusted as it stands.
     faults : tuple of DataFault

@@ -56,7 +56,7 @@ def coefficients_section(
     if isinstance(fit, NavigationFit):
         drawn.append(influence_part(fit, draw))
     if len(calibration.history.t):
-        told = quiet("Closed-loop pass. Grey: the table turns, no measurements.")
+        told = quiet("Last pass. Grey: the table turns, no measurements.")
         drawn.append(folded("Sigma of every coefficient against time", told, draw(sigma_history(calibration))))
     told = f"Of the model as given, which lacks {escape(', '.join(lacking))}: these are off as the first screen says."
     return section(

@@ -270,6 +270,20 @@ def test_a_set_of_which_recordings_have_functions_of_their_own_is_unexplained(su
     assert statements_of_set(Verdict.UNEXPLAINED, common)[0].startswith("The recordings share something")
 
 
+def test_a_fault_of_one_recording_does_not_hide_what_another_one_has(summary):
+    after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None}, warnings=())
+    fault = SetFinding("gyro_bias_step_x(t0=9 s)", "", "r2", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.99)
+    told = Probabilities(0.9, (), ())
+    for name, word in (("r1", Verdict.UNEXPLAINED), ("r2", Verdict.DATA_FAULT)):
+        own = [FunctionShare(name, 0.97, ("accel_x",))]
+        facts = SetFacts([fault], after, SimpleNamespace(reports=()), None, told, own)
+        assert verdict_of_set(facts) == word
+        assert f"An error that follows the attitude is in {name} (accel_x, 97 %)." in statements_of_set(word, facts)
+    # Where the search came to no end no probability is told.
+    open_ = replace(facts, told=None)
+    assert "is in r2 (accel_x)." in " ".join(statements_of_set(Verdict.DATA_FAULT, open_))
+
+
 def test_a_coefficient_of_one_recording_is_named_with_it():
     assert named("gyro_bias_x@r2") == f"{named('gyro_bias_x')} in r2 alone"
 

@@ -147,7 +147,7 @@ def accelerometer_frame_model(asked: ImuModel, imu: ImuSpecification) -> Acceler
     prior[place[own]], mean[place[own]], restated[place[own]] = asked.prior[own], asked.mean[own], True
     inner = replace(inner, prior=prior, mean=mean, restated=restated, stated=stated)
     inner = replace(inner, correlation=_correlation(turned, np.where(asked.restated, -1, place), len(stated)))
-    if unbalance and not set(_OUTSIDE) & set(asked.names):
+    if unbalance:
         misalignment = asked.stated[asked.names.index("accel_misalignment_xy")]
         size = np.full(len(_OUTSIDE), np.sqrt(2.0) * misalignment * np.max(asked.stated[unbalance]))
         inner = with_serving(inner, [_turned_unbalance()], size, np.zeros(len(size)), np.zeros(len(size)))

@@ -1,8 +1,8 @@
 """The gauge: coefficients and their covariance in a named body frame.
 
 Turning the body frame changes gyro misalignment, accelerometer misalignment and attitude together and changes no
-measurement. The filter works in the frame of its prior; what is reported stands in a frame that the
-sensors themselves define (doc/conventions.md).
+measurement. What is reported stands in a frame that the sensors themselves define (doc/conventions.md); the passes work
+in the accelerometers' frame where the model can turn, else in that of its priors.
 
 Values turn exactly: with the matrices M_a = I + scale + misalignment, M_g likewise and the mass unbalance G, a body
 frame turned by R has M_a R', M_g R', G R'. The covariance turns to first order, which for misalignments of

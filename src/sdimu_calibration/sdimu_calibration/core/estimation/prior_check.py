@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.units import from_si
@@ -33,7 +33,7 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
     """
     prior, variance = sensors.prior, np.diag(covariance)
     taken = np.maximum(prior**2 - variance, _LEAST * prior**2)
-    told = sensors.restated & (prior > 0.0)
+    told = sensors.restated & (prior > 0.0) & _stated(sensors)
     said = sensors.mean + (estimate - sensors.mean) * np.divide(prior**2, taken, out=np.ones(len(prior)), where=told)
     pull = np.divide(np.abs(estimate - sensors.mean), np.sqrt(taken), out=np.zeros(len(prior)), where=told)
     out = []
@@ -53,6 +53,12 @@ def contradicted(sensors: ImuModel, estimate: Floats, covariance: Floats) -> lis
                 f"say {found:.4g} {unit}, {pull[k]:.0f} sigma away; correct that prior, or leave it out"
             )
     return out
+
+
+def _stated(sensors: ImuModel) -> Bools:
+    """Tell the parameters whose prior a file states from those that only serve, but for the site's; shape (q,)."""
+    serving = len(sensors.names) - sensors.serving
+    return np.array([k < serving or name in SITE_REFERENCES for k, name in enumerate(sensors.names)], dtype=bool)
 
 
 def outside(sensors: ImuModel, estimate: Floats) -> list[str]:

@@ -1,8 +1,7 @@
 """Fits by other methods than navigation: batch least squares, and the classical one against the table's angles.
 
 Their residuals are not innovations, so what a diagnosis asks of them is answered by a navigation about their
-coefficients that keeps them as they are: a pass of the filter, or of the second-order estimator for a batch whose
-priors make squares count.
+coefficients that keeps them as they are.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -65,6 +66,7 @@ def solve(
     progress: Progress = silent,
     learn: bool = True,
     azimuth_free: bool = False,
+    turns: bool = True,
 ) -> Fit:
     """Fit a model to a test.
 
@@ -83,13 +85,16 @@ def solve(
     azimuth_free : bool
         Estimate the horizontal Earth rate in the place of the azimuth. Where the noise that is learned hides the
         azimuth this is done unasked.
+    turns : bool
+        Estimate in the accelerometers' frame where the model has all that this asks for; False: in that of its priors.
     """
     named = OLDER_NAMES.get(estimator, estimator)
     choice = choose_estimator(test, model) if named == AUTO else Choice(named, "by request")
     if choice.estimator not in ESTIMATORS:
         raise DataError(f"estimator '{estimator}': expected one of {', '.join((AUTO, *ESTIMATORS))}")
     _check(test, model, choice.estimator)
-    make = _free_azimuth if azimuth_free else ESTIMATORS[choice.estimator]
+    asked = partial(_filter, azimuth_free=azimuth_free, turns=turns)
+    make = asked if azimuth_free or not turns else ESTIMATORS[choice.estimator]
     try:
         fit = replace(make(test, model, start, progress), reason=choice.reason)
         if not learn:
@@ -102,7 +107,7 @@ def solve(
         raise DivergedError(f"{_NO_NOISE}{_likely_cause(test, model)}") from error
     if found.terms and isinstance(fit, NavigationFit) and azimuth_is_lost(fit, found.terms):
         # Without a start: the fit is then the same whichever fit came before it.
-        fit = replace(_free_azimuth(test, model, None, progress), reason=_HIDDEN)
+        fit = replace(_filter(test, model, None, progress, azimuth_free=True, turns=turns), reason=_HIDDEN)
         found = noise_of(fit)
     return found.taken_by(fit)
 
@@ -173,7 +178,10 @@ def extend(
         As for `solve`.
     """
     model = with_effects(fit.model, effects)
-    wider = solve(fit.test, model, fit.estimator, fit.start if warm else None, progress, learn, fit.azimuth_free)
+    # Columns of the evidence of the fit are sought in the wider one: its frame stays.
+    turns = not isinstance(fit, NavigationFit) or fit.frame_model.turned
+    start = fit.start if warm else None
+    wider = solve(fit.test, model, fit.estimator, start, progress, learn, fit.azimuth_free, turns)
     return replace(wider, reason=fit.reason)
 
 
@@ -203,10 +211,16 @@ def _prepared(test: PreparedTest, model: Model, progress: Progress) -> tuple[Tes
 
 
 def _filter(
-    test: PreparedTest, model: Model, start: Start | None, progress: Progress, azimuth_free: bool = False
+    test: PreparedTest,
+    model: Model,
+    start: Start | None,
+    progress: Progress,
+    azimuth_free: bool = False,
+    turns: bool = True,
 ) -> Fit:
+    """Fit by passes; `azimuth_free` and `turns` as for `solve`."""
     setup, prepared = _prepared(test, model, progress)
-    frame_model = _framed(setup, azimuth_free)
+    frame_model = _framed(setup, azimuth_free, turns)
     inner = replace(setup, sensors=frame_model.inner)
     alignment = first_attitude(prepared.epochs, prepared.phases, inner)
     begin = None
@@ -218,14 +232,10 @@ def _filter(
     return NavigationFit(test, model, setup.sensors, solution.setup, prepared, alignment, solution, frame_model)
 
 
-def _free_azimuth(test: PreparedTest, model: Model, start: Start | None, progress: Progress) -> Fit:
-    """Fit by passes that estimate the horizontal Earth rate in the place of the azimuth."""
-    return _filter(test, model, start, progress, azimuth_free=True)
-
-
-def _framed(setup: TestSetup, azimuth_free: bool = False) -> AccelerometerFrameModel:
+def _framed(setup: TestSetup, azimuth_free: bool = False, turns: bool = True) -> AccelerometerFrameModel:
     """Put the model of a setup into its frame, what serves behind it: an Earth rate of any direction, the site."""
-    found = model_in_frame(setup.sensors, setup.imu, setup.model.body_frame)
+    frame = setup.model.body_frame
+    found = model_in_frame(setup.sensors, setup.imu, frame) if turns else as_asked(setup.sensors, frame)
     inner = with_any_direction(found.inner, setup.site.latitude_rad) if azimuth_free else found.inner
     # What the site says of itself that it is not certain of.
     return replace(found, inner=with_references(inner, stated_references(setup.site)))

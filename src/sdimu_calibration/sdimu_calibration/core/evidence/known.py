@@ -125,7 +125,10 @@ def in_frame_of_priors(known: Known, asked: ImuModel) -> Known:
     # The data say nothing of the turn of the frame.
     F = body_frame.frame_jacobian(names, body_frame.FRAMES[0], by_temperature=False)[: len(known.names)]
     sizes = dict(zip(known.names, known.prior.tolist(), strict=True))
-    sizes |= dict(zip(asked.names, asked.prior.tolist(), strict=True))
+    for name, size in zip(asked.names, asked.prior.tolist(), strict=True):
+        # In the turned frame those of the misalignments hold the turn, too; others may have been widened.
+        turns = "misalignment" in name or name not in sizes
+        sizes[name] = size if turns else max(size, sizes[name])
     scatter = np.concatenate([known.scatter, np.zeros(len(pinned))])
     return Known(names, F.T @ known.J @ F, np.array([sizes[name] for name in names]), scatter)
 

@@ -123,7 +123,7 @@ def known_pass(prepared: PreparedData, setup: TestSetup, start: Alignment, finis
     firm, estimate = firm_setup(setup), finished.estimate
     at = linearise(prepared, firm, finished.smoothed_start, estimate)
     begin = _with_known_coefficients(begun(at, firm, start), len(estimate))
-    done = run_linearised(at, firm, begin, keep=True, navigation_only=True)
+    done = run_linearised(at, firm, begin, keep=True)
     return KnownPass(done.output, at.seen, at.weight)
 
 

@@ -55,7 +55,7 @@ def impossible_prior(sensors: ImuModel, values: Floats, place: str) -> str:
 
 def _place(sensors: ImuModel, k: int, place: str) -> str:
     """File and key where the prior of a parameter stands."""
-    if sensors.restated[k]:
+    if sensors.restated[k] and k < len(sensors.names) - sensors.serving:
         return f"model: priors.{sensors.names[k]}"
     effect = next(e for e in sensors.effects for p in e.parameters if p is sensors.parameters[k])
     family = effect.family or effect.name

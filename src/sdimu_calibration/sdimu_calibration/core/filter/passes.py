@@ -34,8 +34,8 @@ from sdimu_calibration.core.recording import DataError, DivergedError
 SNAPSHOT_EPOCHS = 5
 """Number of epochs from one kept covariance of the coefficients to the next: it changes slowly, and is large."""
 _PIECE = 3
-"""Number of epochs of a stop between two shifts of the attitude to that of the stop: in more, a cheap gyro drifts so
-far that azimuth looks observable."""
+"""Number of epochs (1 s, up to 10 s in long rests) of a stop between two shifts of the attitude to that of the stop: in
+more, a cheap gyro drifts so far that azimuth looks observable."""
 
 
 def motion_about(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference: Floats) -> Motion:
@@ -94,9 +94,7 @@ def linearise(prepared: PreparedData, setup: TestSetup, C_nb: Floats, reference:
     return Linearisation(reference, C_stop[0] if resting else C_nb, seen, clean.weight, data)
 
 
-def one_pass(
-    prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats, keep: bool = False
-) -> Pass:
+def one_pass(prepared: PreparedData, setup: TestSetup, start: Alignment, C_nb: Floats, reference: Floats) -> Pass:
     """Run one pass about exactly corrected samples.
 
     Parameters
@@ -107,11 +105,9 @@ def one_pass(
         Initial attitude about which the pass is linearised, b to n.
     reference : ndarray, shape (p,)
         Coefficients at which the samples are corrected (SI).
-    keep : bool
-        Keep the matrices of every epoch in the output.
     """
     at = linearise(prepared, setup, C_nb, reference)
-    return run_linearised(at, setup, begun(at, setup, start), keep)
+    return run_linearised(at, setup, begun(at, setup, start))
 
 
 def begun(at: Linearisation, setup: TestSetup, start: Alignment) -> PassState:
@@ -119,18 +115,16 @@ def begun(at: Linearisation, setup: TestSetup, start: Alignment) -> PassState:
     return start_state(setup, start, at.C_start, at.reference)._replace(used=np.zeros(len(at.reference)))
 
 
-def run_linearised(
-    at: Linearisation, setup: TestSetup, begin: PassState, keep: bool = False, navigation_only: bool = False
-) -> Pass:
+def run_linearised(at: Linearisation, setup: TestSetup, begin: PassState, keep: bool = False) -> Pass:
     """Run the filter about a linearisation from the state `begin`.
 
     Parameters
     ----------
-    keep, navigation_only : bool
-        Keep the matrices of every epoch in the output, of the navigation errors alone (`new_output`).
+    keep : bool
+        Keep the matrices of the navigation errors of every epoch in the output.
     """
     state = PassState(*(v.copy() for v in begin))
-    output = new_output(len(at.data.first), len(begin.used), keep, SNAPSHOT_EPOCHS, navigation_only)
+    output = new_output(len(at.data.first), len(begin.used), keep, SNAPSHOT_EPOCHS, navigation_only=keep)
     run_pass(at.data, pass_settings(setup, closed_loop=False), state, output)
     try:
         check_finite(state)

@@ -133,6 +133,8 @@ class Report:
     """Equations of a run by hand, from which the set learns the scatter."""
     scatter: Floats | None = None
     """That of the set in which the rows are, shape (3,); None is the run's own."""
+    fault_kinds: tuple[str, ...] = ()
+    """Kinds of the faults of the recording, as of `DataFault`."""
 
     @property
     def stands_alone(self) -> bool:
@@ -217,7 +219,8 @@ def _report(job: Job, fit: Fit) -> Report:
         weighed = job.rivals and fit.estimator != HandheldFit.estimator
         wander = wander_in(evidence, terms) if weighed or terms else None
         found, places = reduced(evidence, terms, wander), None
-        rivals = rival_noises(evidence, wander) if weighed and wander else ()
+        beside = () if job.function is None else job.function.sensors
+        rivals = rival_noises(evidence, wander, beside) if weighed and wander else ()
     log = recording.temperature
     rows = _named(found, job, shared)
     return Report(
@@ -247,6 +250,7 @@ def _report(job: Job, fit: Fit) -> Report:
         tuple(replace(one, names=(*rows.names, *rows.labels)) for one in rivals),
         _equations(fit, job),
         job.scatter,
+        tuple(dict.fromkeys(f.kind for f in fit.faults)),
     )
 
 

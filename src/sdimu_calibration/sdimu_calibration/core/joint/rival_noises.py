@@ -6,7 +6,7 @@ other recordings of the set tell. So a search in a set weighs the noises of ever
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.reduction import Reduction, kept_and_others
+from sdimu_calibration.core.noise_term import ATTITUDE
 from sdimu_calibration.core.posterior.board import Board, same_noise
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import noises_of
@@ -76,7 +77,7 @@ def in_its_noise(reduction: Reduction) -> InOneNoise:
     return InOneNoise(NoiseModel(), names, np.arange(len(names)), A.T @ A, A.T @ y, 0.0, 0.0, squares, reduction.rows)
 
 
-def rival_noises(evidence: LinearEvidence, wander: Wander) -> tuple[InOneNoise, ...]:
+def rival_noises(evidence: LinearEvidence, wander: Wander, functions: Sequence[str] = ()) -> tuple[InOneNoise, ...]:
     """Work out the noises that a recording leaves probable, and what it says in each.
 
     Parameters
@@ -85,15 +86,27 @@ def rival_noises(evidence: LinearEvidence, wander: Wander) -> tuple[InOneNoise, 
         In white noise, with the candidates of the set.
     wander : Wander
         As of `wander_in` for the noise of its fit, which sets the length of the stretches.
+    functions : sequence of str
+        Sensors that may have a function of the attitude beside the noise: theirs is no noise besides.
     """
     evidence = evidence.in_inner(wander.inner)
     board = Board(evidence, np.arange(len(evidence.weight), len(evidence.names)), frozenset(), wander)
     noises = [NoiseModel()]
-    for noise in noises_of(board):
+    for noise in (_without_functions(noise, functions) for noise in noises_of(board)):
         if len(noises) < _MOST and not any(same_noise(noise, other) for other in noises):
             noises.append(noise)
     joint = board.joint or Joint.of(evidence, wander)
     return tuple(_in_one(joint, noise) for noise in noises)
+
+
+def _without_functions(noise: NoiseModel, sensors: Sequence[str]) -> NoiseModel:
+    """Leave out of a noise what follows the attitude in some sensors: one cause would stand in a model twice."""
+    kept = [
+        (term, share)
+        for term, share in zip(noise.terms, noise.shares, strict=True)
+        if term.kind != ATTITUDE or not {f"{term.triad}_{'xyz'[axis]}" for axis in term.axes} & set(sensors)
+    ]
+    return NoiseModel(tuple(term for term, _ in kept), tuple(share for _, share in kept))
 
 
 def _in_one(joint: Joint, noise: NoiseModel) -> InOneNoise:

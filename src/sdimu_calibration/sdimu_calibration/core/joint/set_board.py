@@ -101,7 +101,11 @@ class SetBoard(Board[SetEvidence]):
         self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
         self.functions = FunctionPrior(fit.function, evidence, usual_sizes(evidence.imu))
         self._layout = Layout(len(self.rivals), len(self.functions.counts))
-        self._counts = self._layout.choice([*map(len, self.rivals)], self.functions.counts, self.functions.counts)
+        # In a single rest a function is a bias.
+        self._moves = [len(r.times.stops) > 1 for r in fit.reports]
+        counts = self.functions.counts
+        own = [counts if moves else (1,) * len(counts) for moves in self._moves]
+        self._counts = self._layout.choice([*map(len, self.rivals)], counts, own)
         self._white = (0,) * len(self._counts)
         self._found: dict[Members, dict[tuple[int, ...], float]] = {}
         self._kept: dict[Hashable, tuple[Ints, Share]] = {}
@@ -213,7 +217,9 @@ class SetBoard(Board[SetEvidence]):
         if not none:
             return [self._white]
         of_fit = (OF_FIT,) * len(none)
-        return [self._white, self._layout.choice(white, of_fit, none), self._layout.choice(white, none, of_fit)]
+        own = [of_fit if moves else none for moves in self._moves]
+        common = self._layout.choice(white, of_fit, [none] * len(own))
+        return [self._white, common, self._layout.choice(white, none, own)]
 
     def _of_unit(self, best: tuple[int, ...]) -> list[tuple[int, ...]]:
         """Choices in which one kind of noise is in all recordings; each recording else as near `best` as it can."""
@@ -284,7 +290,7 @@ class SetBoard(Board[SetEvidence]):
             chosen[k] = min(same, key=lambda j: sum(abs(every[j][i] - wanted[i]) for i in wanted), default=chosen[k])
         if fit.function is not None:
             none, size = self._layout.common(self._white), self.functions.nearest(fit.function.size)
-            return self._noise(self._layout.choice(chosen[: len(self.rivals)], size, none))
+            return self._noise(self._layout.choice(chosen[: len(self.rivals)], size, [none] * len(self.rivals)))
         return self._noise(tuple(chosen))
 
     def _noise(self, chosen: tuple[int, ...]) -> NoiseModel:

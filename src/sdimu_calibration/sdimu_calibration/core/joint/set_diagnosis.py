@@ -111,11 +111,11 @@ def diagnose_set(
     again = recurrence(leftovers(found.after, run))
     before, without = set_outcome(found.before), found
     beside = _beside_function(found, again, options, run, extra, progress)
-    functions = () if beside is None else beside.functions
+    functions = () if beside is None or not beside.stood else beside.functions
     if again is not None and beside is not None:
         # What is of the attitude all rows tell; where kinds look the same they say nothing of the others.
-        common = functions[0]
-        again = again.judged(ATTITUDE, common.probability) if again.apart else again
+        common = beside.functions[0]
+        again = again.judged(ATTITUDE, common.probability) if again.apart and beside.stood else again
         if beside.any_function > PROBABLE:
             found, again = beside, replace(again, sensors=common.sensors if common.likely else again.sensors)
     facts = _facts(found, again)
@@ -175,19 +175,18 @@ def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
     told = probabilities(found.posterior) if found.stood else None
     # In a single rest nothing changes that a cause could follow.
     moved = [(k, r) for k, r in enumerate(found.after.reports) if len(r.times.stops) > 1]
-    own = {r.name: unexplained(found.drawn_in(k), notes=r.notes) for k, r in moved}
+    own = {r.name: unexplained(found.drawn_in(k), r.fault_kinds, r.notes) for k, r in moved}
     drawn = {name: terms for name, terms in own.items() if terms}
-    likely = tuple(one for one in found.functions if one.likely)
-    return SetFacts(_findings(found), after, found.after, again, told, likely, drawn)
+    return SetFacts(_findings(found), after, found.after, again, told, found.told_functions, drawn)
 
 
 def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> tuple[str, ...]:
     """Say what an unknown function explains, and how likely it is; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
-    too = (f"It also explains {', '.join(names)}: not told.",) if names else ()
-    common = next((one for one in found.functions if one.is_common and one.likely), None)
+    common = next((one for one in found.told_functions if one.is_common), None)
     if common is None:
-        return too
+        return (f"Functions of single recordings also explain {', '.join(names)}: not told.",) if names else ()
+    too = (f"It also explains {', '.join(names)}: not told.",) if names else ()
     of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
     # Where the search went to and fro no probabilities are told.
     share = f" ({in_percent(common.probability)})" if found.stood else ""

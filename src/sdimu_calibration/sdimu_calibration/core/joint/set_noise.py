@@ -77,6 +77,6 @@ class Layout:
         first = self.recordings + self.sensors
         return tuple(tuple(chosen[k : k + self.sensors]) for k in range(first, len(chosen), self.sensors or 1))
 
-    def choice(self, noises: Sequence[int], common: Sequence[int], own: Sequence[int]) -> tuple[int, ...]:
-        """Put a choice together; `own` are sizes of every recording's own function."""
-        return (*noises, *common, *(tuple(own) * self.recordings))
+    def choice(self, noises: Sequence[int], common: Sequence[int], own: Sequence[Sequence[int]]) -> tuple[int, ...]:
+        """Put a choice together; `own` are sizes of each recording's own function."""
+        return (*noises, *common, *(size for sizes in own for size in sizes))

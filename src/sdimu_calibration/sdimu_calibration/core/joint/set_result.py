@@ -269,7 +269,7 @@ def _misfit(fit: SetFit) -> list[Note]:
     worst = {r.name: worst_figure(r) for r in fit.reports}
     bad = sorted((r for r in fit.reports if worst[r.name] > MISFIT), key=lambda r: -worst[r.name])
     if not bad:
-        odd = [(r.name, unexplained(r.noise, notes=r.notes)) for r in fit.reports]
+        odd = [(r.name, unexplained(r.noise, r.fault_kinds, r.notes)) for r in fit.reports]
         return [not_of_sensors(terms, name) for name, terms in odd if terms][:_LISTED]
     told = "; ".join(f"{r.name}: {_figures(r)}" for r in bad[:_LISTED]) + ("; others" if bad[_LISTED:] else "")
     return [

@@ -148,6 +148,14 @@ class SetSearch:
 
         return tuple(channel for channel in CHANNELS if of(channel) > NAMED)
 
+    @property
+    def told_functions(self) -> tuple[FunctionShare, ...]:
+        """Those that are likely; where one is, and it is open whose, the likeliest."""
+        likely = tuple(one for one in self.functions if one.likely)
+        if likely or self.any_function <= PROBABLE:
+            return likely
+        return (max(self.functions, key=lambda one: one.probability),)
+
     def drawn_in(self, place: int) -> tuple[NoiseTerm, ...]:
         """Noise that hangs on attitude, rate or turns, nearly certain in a recording, by its place among the reports.
 
@@ -224,7 +232,7 @@ def search_beside(
     again = _searched(found.before, fit, found.told, options, run, extra, progress)
     shared = again.after.function
     if shared is not None:
-        told = tuple(s for one in again.functions if one.is_common and one.likely for s in one.sensors)
+        told = tuple(s for one in again.told_functions if one.is_common for s in one.sensors)
         again = replace(again, after=replace(again.after, function=replace(shared, told=told)))
     return replace(again, first=found.first, threshold=found.threshold)
 

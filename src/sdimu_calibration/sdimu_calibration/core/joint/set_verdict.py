@@ -99,9 +99,12 @@ def verdict_of_set(facts: SetFacts) -> Verdict:
     findings, error = facts.findings, facts.after.fit["held_out_rms"]
     shared = [(f.label, f.alike) for f in findings if not f.recording]
     still = error is not None and error > STILL_WRONG and held_out_chance(facts.fit, error) < SCATTERS
-    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back or bool(facts.functions or facts.drawn)
+    left = _scatter(facts.after) < SCATTERS or still or facts.comes_back
     # A fault leaves traces in its recording that are no physics of the unit.
-    unexplained = facts.beside_function or (left and (bool(shared) or not findings))
+    unlike = {*facts.drawn, *(one.recording for one in facts.functions)} - {
+        f.recording for f in findings if f.recording
+    }
+    unexplained = bool(unlike) or (left and (bool(shared) or not findings))
     # A search that came to no end says that something is missing.
     unexplained |= not findings and facts.told is None
     nothing = 1.0 if facts.told is None else facts.told.nothing
@@ -134,7 +137,7 @@ def _found(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
         mark = ":" if facts.again is None else ","
         return (f"The model explains all recordings together{mark} {how}{nothing_missing(told)}.",)
     if word == Verdict.DATA_FAULT:
-        return (_of_recordings(findings),)
+        return (_of_recordings(findings), *_of_each(facts))
     every = each_grade(list(map(_graded, findings))) if findings else ()
     if word == Verdict.UNEXPLAINED:
         odd = () if facts.beside_function else _odd(facts.after)
@@ -156,14 +159,20 @@ def _of_recordings(findings: Sequence[SetFinding]) -> str:
 def _of_each(facts: SetFacts) -> tuple[str, ...]:
     """Say what recordings have each for itself: a function of the attitude, or noise that no sensor has by itself."""
     own = [one for one in facts.functions if not one.is_common]
-    alone = [f"{one.recording} ({', '.join(one.sensors)}, {in_percent(one.probability)})" for one in own]
+    alone = [f"{one.recording} ({_how(one, facts.told is not None)})" for one in own]
     words: dict[str, list[str]] = {}
     for name, terms in facts.drawn.items():
         for term in terms:
             words.setdefault(term.words, []).append(name)
     drawn = [f"{what} in {_some(names)}" for what, names in words.items()]
-    told = [f"An error that follows the attitude, another one in each, is in {_some(alone)}."] if alone else []
+    each = ", another one in each," if len(alone) > 1 else ""
+    told = [f"An error that follows the attitude{each} is in {_some(alone)}."] if alone else []
     return (*told, *([f"What is left looks like {_some(drawn)}; the sigmas count it {IF_NONE}."] if drawn else []))
+
+
+def _how(one: FunctionShare, weighed: bool) -> str:
+    """Name the sensors of a function, and say how likely it is where the search came to an end."""
+    return ", ".join((*one.sensors, *((in_percent(one.probability),) if weighed else ())))
 
 
 def _some(names: Sequence[str]) -> str:
