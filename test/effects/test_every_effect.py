@@ -114,7 +114,7 @@ def passed(perfect, effect):
     none = np.zeros(len(setup.sensors.prior))
     at = linearise(perfect.prepared, setup, start.C_nb, none)
     at = replace(at, data=at.data._replace(shift=np.full_like(at.data.shift, -1)))
-    return run_linearised(at, setup, begun(at, setup, start), keep=True), setup
+    return run_linearised(at, setup, begun(at, setup, start)), setup
 
 
 # -- what an effect says of itself ------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis, diagnose_set
 from sdimu_calibration.core.joint.set_fit import SetFit, SetOptions, fit_set
+from sdimu_calibration.core.joint.set_found import FunctionShare
 from sdimu_calibration.core.joint.set_verdict import SetFinding
 from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
@@ -150,6 +151,11 @@ class JointDiagnosis(Diagnosed):
     def function(self) -> float | None:
         """Probability that all recordings share an unknown function of the attitude; None where none was looked for."""
         return self.core.function
+
+    @property
+    def functions(self) -> tuple[FunctionShare, ...]:
+        """The same with its sensors, then that of each recording alone; empty where none was looked for."""
+        return self.core.functions
 
     @property
     def unknown(self) -> tuple[UnknownFunction, ...]:

@@ -88,6 +88,11 @@ class NoiseTerm:
         return sensors_of(self.triad, self.axes)
 
     @property
+    def sensors(self) -> frozenset[str]:
+        """Names of the sensors that have the noise, as of the channels of effects: ``accel_x``."""
+        return frozenset(f"{self.triad}_{'xyz'[axis]}" for axis in self.axes)
+
+    @property
     def is_drawn(self) -> bool:
         """Whether the noise is drawn anew at stops or turns, and nothing that wanders looks the same."""
         return DRAWN.issuperset((self.kind, *self.alike))

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from imus import PERCENTS
 from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
@@ -18,8 +19,6 @@ from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import rotation_matrix, rotation_vector
-from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
@@ -32,23 +31,6 @@ SHORT = Plan(
     np.radians(9.0),
 )
 """The same orientations in ten minutes."""
-
-PERCENTS = ImuSpecification(
-    "percents",
-    gyro_white_noise=to_si(15, "deg/h/sqrt(Hz)"),
-    accel_white_noise=to_si(100, "ug/sqrt(Hz)"),
-    prior={
-        "gyro_bias": to_si(1, "deg/s"),
-        "gyro_scale": 0.02,
-        "gyro_misalignment": to_si(2, "deg"),
-        "gyro_mass_unbalance": to_si(50, "deg/h/g"),
-        "accel_bias": to_si(20, "mg"),
-        "accel_scale": 0.02,
-        "accel_misalignment": to_si(2, "deg"),
-    },
-    grade="mems",
-)
-"""A MEMS IMU as it comes from the factory."""
 
 
 def nees(found, truth):

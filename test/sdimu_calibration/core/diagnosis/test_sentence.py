@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.verdict import Facts, something_missing, s
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import split
-from sdimu_calibration.core.joint.set_search import FunctionShare
+from sdimu_calibration.core.joint.set_found import FunctionShare
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
 from sdimu_calibration.core.joint.set_verdict import statements as statements_of_set
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from imus import PERCENTS
 from scipy.stats import chi2
 
 from sdimu_calibration.core.alignment.prepared import reduce, set_up
@@ -12,28 +13,11 @@ from sdimu_calibration.core.effects.accelerometer_frame import accelerometer_fra
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
 from sdimu_calibration.core.navigation.track import Correction, motion
-from sdimu_calibration.core.specification import ImuSpecification
-from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.config import load_imu, load_plan
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import in_body_frame
 
 KIM18 = load_plan("kim18")
-PERCENTS = ImuSpecification(
-    "percents",
-    gyro_white_noise=to_si(15, "deg/h/sqrt(Hz)"),
-    accel_white_noise=to_si(100, "ug/sqrt(Hz)"),
-    prior={
-        "gyro_bias": to_si(1, "deg/s"),
-        "gyro_scale": 0.02,
-        "gyro_misalignment": to_si(2, "deg"),
-        "gyro_mass_unbalance": to_si(50, "deg/h/g"),
-        "accel_bias": to_si(20, "mg"),
-        "accel_scale": 0.02,
-        "accel_misalignment": to_si(2, "deg"),
-    },
-    grade="mems",
-)
 
 
 def normalised(found, truth):

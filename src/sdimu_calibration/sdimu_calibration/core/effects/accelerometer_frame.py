@@ -90,8 +90,7 @@ class AccelerometerFrameModel:
 
 def squares_count(sensors: ImuModel) -> bool:
     """Tell whether the specification lets errors be so large that their squares count."""
-    linear = scales_and_angles(sensors)
-    return bool(len(linear)) and float(np.max(sensors.prior[linear])) > LARGE
+    return bool(np.any(sensors.prior[scales_and_angles(sensors)] > LARGE))
 
 
 def are_large(names: Sequence[str], weight: Floats) -> bool:

@@ -104,7 +104,7 @@ def _without_functions(noise: NoiseModel, sensors: Sequence[str]) -> NoiseModel:
     kept = [
         (term, share)
         for term, share in zip(noise.terms, noise.shares, strict=True)
-        if term.kind != ATTITUDE or not {f"{term.triad}_{'xyz'[axis]}" for axis in term.axes} & set(sensors)
+        if term.kind != ATTITUDE or term.sensors.isdisjoint(sensors)
     ]
     return NoiseModel(tuple(term for term, _ in kept), tuple(share for _, share in kept))
 

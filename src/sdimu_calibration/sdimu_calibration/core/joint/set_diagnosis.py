@@ -27,15 +27,9 @@ from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
+from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import (
-    FunctionShare,
-    SetSearch,
-    place_of,
-    place_of_local,
-    search_beside,
-    search_set,
-)
+from sdimu_calibration.core.joint.set_search import place_of, place_of_local, search_beside, search_set
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
 from sdimu_calibration.core.noise_term import unexplained
 from sdimu_calibration.core.plain_text import capital, first_of, listing

@@ -7,22 +7,20 @@ again in the next round, about the fit that has it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.diagnosis.candidates import catalogue, without
-from sdimu_calibration.core.diagnosis.grades import NAMED
-from sdimu_calibration.core.diagnosis.search import CERTAIN_NOISE, FALSE_ALARM, Search, search, with_steps
+from sdimu_calibration.core.diagnosis.search import FALSE_ALARM, Search, search, with_steps
 from sdimu_calibration.core.effects import selection
-from sdimu_calibration.core.effects.effect import CHANNELS, Effect
+from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
-from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
 from sdimu_calibration.core.joint.function_fit import in_size
 from sdimu_calibration.core.joint.member import Member
@@ -30,10 +28,9 @@ from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, ta
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
-from sdimu_calibration.core.joint.set_noise import SetNoise
+from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, of_one_recording
 from sdimu_calibration.core.joint.set_standing import set_standing
-from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
-from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
+from sdimu_calibration.core.posterior.posterior import Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
 
@@ -48,145 +45,6 @@ take up so much of a strong effect that its score is small."""
 _DOUBLE = 0.995
 """Correlation of two columns (1) from which one of them already is the other: they differ by a tenth of their
 length."""
-
-
-@dataclass(frozen=True)
-class LocalFind:
-    """An effect of one recording."""
-
-    recording: str
-    key: str
-    z: float
-    """Score beside what was found before it."""
-    probability: float
-    """That it or something of its class is there (1)."""
-
-    @property
-    def label(self) -> str:
-        """Key with the name of the recording behind it."""
-        return tagged(self.key, self.recording)
-
-
-@dataclass(frozen=True)
-class FunctionShare:
-    """How probable an unknown function of the attitude is."""
-
-    recording: str
-    """That which has it alone; empty where all share it."""
-    probability: float
-    sensors: tuple[str, ...]
-    """Those that more likely than not have it, else the likeliest one."""
-
-    @property
-    def is_common(self) -> bool:
-        """Whether all recordings share it."""
-        return not self.recording
-
-    @property
-    def likely(self) -> bool:
-        """Whether it is more likely than not."""
-        return self.probability > PROBABLE
-
-
-@dataclass(frozen=True)
-class SetSearch:
-    """What was found in a set."""
-
-    before: SetFit
-    after: SetFit
-    """`before`, `after`: with the model as given, and with what was found."""
-    chosen: tuple[Candidate, ...]
-    """Effects in all recordings, the largest share of the misfit first."""
-    z: tuple[float, ...]
-    """Score of each beside those before it."""
-    alike: dict[str, tuple[str, ...]]
-    """By label, what the set cannot tell from it."""
-    probability: dict[str, float]
-    """By label, that it or one of these is in all recordings (1)."""
-    may_be: dict[str, tuple[Share, ...]]
-    """By label, coefficients of its class with the probability of each; of what is of one recording, too."""
-    local: tuple[LocalFind, ...]
-    threshold: float
-    """Score that noise reaches in a scan of the joint evidence."""
-    first: Search[SetEvidence]
-    """Of the first round: its scan."""
-    standing: Standing
-    """What the set knows of the unit."""
-    posterior: Posterior[SetEvidence]
-    """The models that all recordings together leave probable."""
-    stood: bool
-    """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
-
-    @property
-    def told(self) -> tuple[Candidate, ...]:
-        """What was found, in all recordings or in one."""
-        return (*self.chosen, *(_of_one(one.label) for one in self.local))
-
-    @property
-    def any_function(self) -> float:
-        """Probability of an unknown function of the attitude, in all recordings or in one (1)."""
-        return self._of_noise(lambda noise: any(noise.function) or any(map(any, noise.own_functions)))
-
-    @cached_property
-    def functions(self) -> tuple[FunctionShare, ...]:
-        """The function that all recordings share, and that of each alone; empty where none was looked for."""
-        if self.after.function is None:
-            return ()
-        own = [self._share(report.name, r) for r, report in enumerate(self.after.reports)]
-        return (self._share("", None), *own)
-
-    @cached_property
-    def may_follow_attitude(self) -> tuple[str, ...]:
-        """Sensors of which some recording may have an error that follows the attitude, as its noise."""
-
-        def has(noise: SetNoise, channel: str) -> bool:
-            terms = (t for one in noise.own for t in one.terms if t.kind == ATTITUDE)
-            return any(channel in {f"{t.triad}_{'xyz'[axis]}" for axis in t.axes} for t in terms)
-
-        def of(channel: str) -> float:
-            return self._of_noise(lambda noise: has(noise, channel))
-
-        return tuple(channel for channel in CHANNELS if of(channel) > NAMED)
-
-    @property
-    def told_functions(self) -> tuple[FunctionShare, ...]:
-        """Those that are likely; where one is, and it is open whose, the likeliest."""
-        likely = tuple(one for one in self.functions if one.likely)
-        if likely or self.any_function <= PROBABLE:
-            return likely
-        return (max(self.functions, key=lambda one: one.probability),)
-
-    def drawn_in(self, place: int) -> tuple[NoiseTerm, ...]:
-        """Noise that hangs on attitude, rate or turns, nearly certain in a recording, by its place among the reports.
-
-        What wanders and looks the same has its own probability.
-        """
-        of_each: dict[NoiseTerm, float] = {}
-        for noise, p in self.posterior.noises:
-            for term in noise.own[place].terms if isinstance(noise, SetNoise) else ():
-                if term.kind in DRAWN:
-                    of_each[term] = of_each.get(term, 0.0) + p
-
-        def certain(triad: str) -> bool:
-            return self._of_noise(lambda noise: bool(noise.own[place].drawn_in(triad))) > CERTAIN_NOISE
-
-        likely = [[term for term in of_each if term.triad == triad] for triad in TRIADS if certain(triad)]
-        return tuple(max(own, key=of_each.__getitem__) for own in likely)
-
-    def _share(self, recording: str, place: int | None) -> FunctionShare:
-        """Say how probable the function of a recording is, by its place among the reports; None: that of all."""
-        sensors = () if self.after.function is None else self.after.function.sensors
-
-        def of(k: int) -> float:
-            return self._of_noise(lambda noise: bool(noise.sizes_of(place)[k]))
-
-        each = [of(k) for k in range(len(sensors))]
-        likely = tuple(s for s, p in zip(sensors, each, strict=True) if p > PROBABLE)
-        together = self._of_noise(lambda noise: any(noise.sizes_of(place)))
-        return FunctionShare(recording, together, likely or (sensors[int(np.argmax(each))],))
-
-    def _of_noise(self, holds: Callable[[SetNoise], bool]) -> float:
-        return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and holds(noise))
 
 
 def search_set(
@@ -345,25 +203,13 @@ def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run
     """
     effects = _candidates(fit, extra, finer)
     full = _gathered(fit, effects, run)
-    local = [_of_one(label) for report in full.reports for label in report.reduction.labels if split_tag(label)[1]]
+    every = [label for report in full.reports for label in report.reduction.labels]
+    local = [of_one_recording(label) for label in every if split_tag(label)[1]]
     reports, labels = with_changes(full.reports, stable_effects(full.model, full.varying))
     changes = [change_of(label, reports[0].imu) for label in labels]
     shared = [c for effect in effects for c in split(effect)]
     full = replace(full, reports=tuple(reports))
     return full, set_evidence(full, shared, [*local, *changes])
-
-
-def _of_one(label: str) -> Candidate:
-    """Candidate of one recording, by its label."""
-    key, recording = split_tag(label)
-    return replace(_by_key(key), label=label, recording=recording)
-
-
-@lru_cache(maxsize=4096)
-def _by_key(key: str) -> Candidate:
-    """Candidate of a key of one parameter: every recording has the same."""
-    (one,) = split(selection.resolve(key))
-    return one
 
 
 def _reopened(evidence: SetEvidence, told: Sequence[Candidate]) -> tuple[Ints, list[Candidate]]:

@@ -17,8 +17,8 @@ from sdimu_calibration.core.joint.recurrence_words import answer_in_words
 from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import SetFit
+from sdimu_calibration.core.joint.set_found import FunctionShare
 from sdimu_calibration.core.joint.set_result import MANY, SCATTERS
-from sdimu_calibration.core.joint.set_search import FunctionShare
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import Topic, topic_of, without_advice
 from sdimu_calibration.core.plain_text import first_of, listing

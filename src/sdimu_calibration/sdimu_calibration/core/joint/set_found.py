@@ -1,0 +1,171 @@
+"""What was found in a set: effects of all recordings and of single ones, functions of the attitude, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.diagnosis.search import CERTAIN_NOISE, Search
+from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.evidence.candidate import Candidate, split
+from sdimu_calibration.core.evidence.known import Standing
+from sdimu_calibration.core.joint.scope import split_tag, tagged
+from sdimu_calibration.core.joint.set_evidence import SetEvidence
+from sdimu_calibration.core.joint.set_fit import SetFit
+from sdimu_calibration.core.joint.set_noise import SetNoise
+from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
+from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
+from sdimu_calibration.core.posterior.told import Share
+
+
+@dataclass(frozen=True)
+class LocalFind:
+    """An effect of one recording."""
+
+    recording: str
+    key: str
+    z: float
+    """Score beside what was found before it."""
+    probability: float
+    """That it or something of its class is there (1)."""
+
+    @property
+    def label(self) -> str:
+        """Key with the name of the recording behind it."""
+        return tagged(self.key, self.recording)
+
+
+@dataclass(frozen=True)
+class FunctionShare:
+    """How probable an unknown function of the attitude is."""
+
+    recording: str
+    """That which has it alone; empty where all share it."""
+    probability: float
+    sensors: tuple[str, ...]
+    """Those that more likely than not have it, else the likeliest one."""
+
+    @property
+    def is_common(self) -> bool:
+        """Whether all recordings share it."""
+        return not self.recording
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is more likely than not."""
+        return self.probability > PROBABLE
+
+
+@dataclass(frozen=True)
+class SetSearch:
+    """What was found in a set."""
+
+    before: SetFit
+    after: SetFit
+    """`before`, `after`: with the model as given, and with what was found."""
+    chosen: tuple[Candidate, ...]
+    """Effects in all recordings, the largest share of the misfit first."""
+    z: tuple[float, ...]
+    """Score of each beside those before it."""
+    alike: dict[str, tuple[str, ...]]
+    """By label, what the set cannot tell from it."""
+    probability: dict[str, float]
+    """By label, that it or one of these is in all recordings (1)."""
+    may_be: dict[str, tuple[Share, ...]]
+    """By label, coefficients of its class with the probability of each; of what is of one recording, too."""
+    local: tuple[LocalFind, ...]
+    threshold: float
+    """Score that noise reaches in a scan of the joint evidence."""
+    first: Search[SetEvidence]
+    """Of the first round: its scan."""
+    standing: Standing
+    """What the set knows of the unit."""
+    posterior: Posterior[SetEvidence]
+    """The models that all recordings together leave probable."""
+    stood: bool
+    """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
+
+    @property
+    def told(self) -> tuple[Candidate, ...]:
+        """What was found, in all recordings or in one."""
+        return (*self.chosen, *(of_one_recording(one.label) for one in self.local))
+
+    @property
+    def any_function(self) -> float:
+        """Probability of an unknown function of the attitude, in all recordings or in one (1)."""
+        return self._of_noise(lambda noise: any(noise.function) or any(map(any, noise.own_functions)))
+
+    @cached_property
+    def functions(self) -> tuple[FunctionShare, ...]:
+        """The function that all recordings share, and that of each alone; empty where none was looked for."""
+        if self.after.function is None:
+            return ()
+        own = [self._share(report.name, r) for r, report in enumerate(self.after.reports)]
+        return (self._share("", None), *own)
+
+    @cached_property
+    def may_follow_attitude(self) -> tuple[str, ...]:
+        """Sensors of which some recording may have an error that follows the attitude, as its noise."""
+
+        def of(channel: str) -> float:
+            return self._of_noise(lambda noise: any(t.kind == ATTITUDE and channel in t.sensors for t in noise.terms))
+
+        return tuple(channel for channel in CHANNELS if of(channel) > NAMED)
+
+    @property
+    def told_functions(self) -> tuple[FunctionShare, ...]:
+        """Those that are likely; where one is, and it is open whose, the likeliest."""
+        likely = tuple(one for one in self.functions if one.likely)
+        if likely or self.any_function <= PROBABLE:
+            return likely
+        return (max(self.functions, key=lambda one: one.probability),)
+
+    def drawn_in(self, place: int) -> tuple[NoiseTerm, ...]:
+        """Noise that hangs on attitude, rate or turns, nearly certain in a recording, by its place among the reports.
+
+        What wanders and looks the same has its own probability.
+        """
+        of_each: dict[NoiseTerm, float] = {}
+        for noise, p in self.posterior.noises:
+            for term in noise.own[place].terms if isinstance(noise, SetNoise) else ():
+                if term.kind in DRAWN:
+                    of_each[term] = of_each.get(term, 0.0) + p
+
+        def certain(triad: str) -> bool:
+            return self._of_noise(lambda noise: bool(noise.own[place].drawn_in(triad))) > CERTAIN_NOISE
+
+        likely = [[term for term in of_each if term.triad == triad] for triad in TRIADS if certain(triad)]
+        return tuple(max(own, key=of_each.__getitem__) for own in likely)
+
+    def _share(self, recording: str, place: int | None) -> FunctionShare:
+        """Say how probable the function of a recording is, by its place among the reports; None: that of all."""
+        sensors = () if self.after.function is None else self.after.function.sensors
+
+        def of(k: int) -> float:
+            return self._of_noise(lambda noise: bool(noise.sizes_of(place)[k]))
+
+        each = [of(k) for k in range(len(sensors))]
+        likely = tuple(s for s, p in zip(sensors, each, strict=True) if p > PROBABLE)
+        together = self._of_noise(lambda noise: any(noise.sizes_of(place)))
+        return FunctionShare(recording, together, likely or (sensors[int(np.argmax(each))],))
+
+    def _of_noise(self, holds: Callable[[SetNoise], bool]) -> float:
+        return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and holds(noise))
+
+
+def of_one_recording(label: str) -> Candidate:
+    """Make the candidate of one recording, by its label."""
+    key, recording = split_tag(label)
+    return replace(_by_key(key), label=label, recording=recording)
+
+
+@lru_cache(maxsize=4096)
+def _by_key(key: str) -> Candidate:
+    """Candidate of a key of one parameter: every recording has the same."""
+    (one,) = split(selection.resolve(key))
+    return one
