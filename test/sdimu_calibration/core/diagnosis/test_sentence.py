@@ -266,7 +266,12 @@ def test_a_set_of_which_recordings_have_functions_of_their_own_is_unexplained(su
         "Something differs between the recordings that no effect of the catalogue explains.",
         "An error that follows the attitude, another one in each, is in r0 (accel_x, 97 %) and r1 (accel_x, 97 %).",
     )
+    # Stops that do not come back say nothing that the functions have not said.
+    assert facts.is_of_each
+    assert statements_of_set(Verdict.UNEXPLAINED, replace(facts, again=SimpleNamespace(answer=()))) == told
     common = replace(facts, functions=[FunctionShare("", 0.97, ("accel_x",))])
+    assert not common.is_of_each
+    assert not replace(facts, again=SimpleNamespace(answer=("time",))).is_of_each
     assert statements_of_set(Verdict.UNEXPLAINED, common)[0].startswith("The recordings share something")
 
 

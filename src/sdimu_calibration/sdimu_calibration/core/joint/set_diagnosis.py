@@ -120,7 +120,7 @@ def diagnose_set(
     why = why if found.stood else (*why, f"{capital(TO_AND_FRO)}.")
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
-    steps = next_steps(again, facts.beside_function)
+    steps = [Advice(Kind.LOOK_AT_MOUNT)] if facts.is_of_each else next_steps(again, facts.beside_function)
     kept = [] if word == Verdict.UNEXPLAINED else _added(found, facts.findings)
     return SetDiagnosis(
         word,

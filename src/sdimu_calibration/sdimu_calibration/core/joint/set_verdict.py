@@ -89,6 +89,11 @@ class SetFacts:
         return any(one.is_common for one in self.functions)
 
     @property
+    def is_of_each(self) -> bool:
+        """Whether functions of single recordings explain what is left, and it does not come back."""
+        return bool(self.functions) and not self.beside_function and not self.comes_back
+
+    @property
     def comes_back(self) -> bool:
         """Whether what is left comes back: it is no noise then, whatever each recording took it for."""
         return self.again is not None and len(self.again.answer) > 0
@@ -122,8 +127,8 @@ def _scatter(result: Calibration) -> float:
 def statements(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
     """Say what was found, a statement a grade, then what each recording has, and what comes back."""
     again = facts.again
-    # Beside a function that explains what is left, stops that do not come back are too few, and say nothing.
-    tells = again is not None and (not facts.beside_function or facts.comes_back)
+    # Beside functions that explain what is left, stops that do not come back are too few, and say nothing.
+    tells = again is not None and (not facts.functions or facts.comes_back)
     more = (answer_in_words(again, word == Verdict.UNEXPLAINED),) if again is not None and tells else ()
     return (*_found(word, facts), *more)
 
