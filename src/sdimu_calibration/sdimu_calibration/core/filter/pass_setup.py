@@ -136,7 +136,7 @@ def loosened(setup: TestSetup) -> TestSetup:
 
 
 def firm_setup(setup: TestSetup) -> TestSetup:
-    """Make the setup of the later passes: Zv and Zp no tighter than can be told from zero."""
+    """Make the setup of passes that have found their place: Zv and Zp no tighter than can be told from zero."""
     model = setup.model
     velocity = _FIRM * setup.imu.accel_white_noise * float(np.sqrt(_MOTION_S))
     position = velocity * _MOTION_S / float(np.sqrt(3.0))

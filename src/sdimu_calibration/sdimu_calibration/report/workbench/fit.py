@@ -56,7 +56,7 @@ class Fitted:
     """The numbers of one fit."""
 
     calibration: Calibration
-    """Without the history of its first pass."""
+    """Without the history of its last pass."""
     prior: Floats
     mean: Floats
     """`prior`, `mean`: sigma and mean of each coefficient's prior (SI), shape (p,)."""
@@ -285,7 +285,7 @@ class FitSession:
 
 
 def _without_history(fit: Fit) -> Calibration:
-    # The history of the first pass costs as much as the fit, and only a report shows it.
+    # Only a report shows the history of the last pass.
     return replace(outcome(fit, held_out=False), history=no_history(len(fit.names)))
 
 
