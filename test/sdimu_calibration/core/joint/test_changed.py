@@ -113,5 +113,7 @@ def test_an_effect_of_one_recording_is_told_of_none_of_the_others(options):
     found = diagnose_set((own.members[0], one.members[1], own.members[2]), options, here)
     assert found.verdict == Verdict.UNEXPLAINED
     assert found.sentence.startswith("Something differs between the recordings")
-    assert "does not come back at the same attitude" in found.sentence
+    assert "An error that follows the attitude is in r1 (accel_y" in found.sentence
+    assert "come back" not in found.sentence
+    assert [one.kind for one in found.advice] == [Kind.LOOK_AT_MOUNT]
     assert not found.unknown

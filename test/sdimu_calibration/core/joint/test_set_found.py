@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from sdimu_calibration.core.joint.set_found import SetSearch
+from sdimu_calibration.core.joint.set_found import SetSearch, following
 from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, RANDOM_WALK, SHIFT, STOP, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
@@ -59,7 +59,8 @@ def test_where_it_is_open_whose_a_function_is_the_likeliest_is_told():
 def test_sensors_that_may_follow_the_attitude_are_those_of_the_noise_of_any_recording():
     here = NoiseTerm("accel", ATTITUDE, size=1.0, axes=(0, 2))
     search = found((noise(second=(here,)), 0.06), (noise(first=(NoiseTerm("gyro", ATTITUDE),)), 0.04), (noise(), 0.9))
-    assert search.may_follow_attitude == ("accel_x", "accel_z")
+    assert following(search.posterior, 0.05) == ("accel_x", "accel_z")
+    assert following(search.posterior, 0.5) == ()
 
 
 def test_noise_is_drawn_where_its_kinds_together_are_nearly_certain_and_what_wanders_is_not():

@@ -37,11 +37,11 @@ def with_function(fit: SetFit, sensors: Sequence[str], run: Run) -> SetFit:
     Parameters
     ----------
     sensors : sequence of str
-        Those that have one.
+        Those that have one; without any the fit stays as it is.
     run : callable
         Does the jobs.
     """
-    if any(r.estimator == HandheldFit.estimator for r in fit.reports):
+    if not sensors or any(r.estimator == HandheldFit.estimator for r in fit.reports):
         return fit
     places = [r.places for r in with_places(fit, run) if r.places is not None]
     stops = np.vstack([p.up for p in places])

@@ -19,22 +19,21 @@ from sdimu_calibration.core.effects.references import LATITUDE, SEEN_AS_GRAVITY
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
-from sdimu_calibration.core.joint.function_fit import unknown_functions, with_function
-from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
+from sdimu_calibration.core.joint.function_fit import unknown_functions
+from sdimu_calibration.core.joint.function_search import searched
 from sdimu_calibration.core.joint.member import Member
-from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
+from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import place_of, place_of_local, search_beside, search_set
+from sdimu_calibration.core.joint.set_search import place_of, place_of_local
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
 from sdimu_calibration.core.noise_term import unexplained
 from sdimu_calibration.core.plain_text import capital, first_of, listing
 from sdimu_calibration.core.plan_search import Question
-from sdimu_calibration.core.posterior.posterior import PROBABLE
 from sdimu_calibration.core.posterior.told import Probabilities, probabilities
 from sdimu_calibration.core.posterior.unknown import UnknownFunction
 from sdimu_calibration.core.probability import chi2_tail, in_percent
@@ -100,22 +99,13 @@ def diagnose_set(
     """Find what the model of a set misses; parameters as for `search_set`."""
     if len(members) < 2:
         raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
-    found = search_set(members, options, run, extra, progress, fitted=fitted)
+    done = searched(members, options, run, extra, progress, fitted)
     progress("report", 0.95)
-    again = recurrence(leftovers(found.after, run))
-    before, without = set_outcome(found.before), found
-    beside = _beside_function(found, again, options, run, extra, progress)
-    functions = () if beside is None or not beside.stood else beside.functions
-    if again is not None and beside is not None:
-        # What is of the attitude all rows tell; where kinds look the same they say nothing of the others.
-        common = beside.functions[0]
-        again = again.judged(ATTITUDE, common.probability) if again.apart and beside.stood else again
-        if beside.any_function > PROBABLE:
-            found, again = beside, replace(again, sensors=common.sensors if common.likely else again.sensors)
-    facts = _facts(found, again)
+    found, again, without = done.found, done.again, done.without
+    before, facts = set_outcome(found.before), _facts(found, again)
     tags = {f.tag for f in facts.findings}
-    refused = () if found is without else tuple(f for f in _findings(without) if f.tag not in tags)
-    why = _explained(again, found, [f.tag for f in refused]) if again is not None and found is not without else ()
+    refused = () if without is None else tuple(f for f in _findings(without) if f.tag not in tags)
+    why = _explained(again, found, [f.tag for f in refused]) if done.beside_function else ()
     word = verdict_of_set(facts)
     why = why if found.stood else (*why, f"{capital(TO_AND_FRO)}.")
     test = found.after.base.test
@@ -137,29 +127,8 @@ def diagnose_set(
         _error_without(found),
         facts.told,
         unknown_functions(found.after) if facts.beside_function else (),
-        functions,
+        done.functions,
     )
-
-
-def _beside_function(
-    found: SetSearch,
-    again: Recurrence | None,
-    options: SetOptions,
-    run: Run,
-    extra: Sequence[Effect],
-    progress: Progress,
-) -> SetSearch | None:
-    """Search again where an unknown function of the attitude may explain what is left; None where none can.
-
-    Some recording alone may have an error that follows the attitude, or what is left may come back with it.
-    """
-    if again is None:
-        return None
-    sensors = found.may_follow_attitude or (again.sensors if again.may_come_back(ATTITUDE) else ())
-    if not sensors:
-        return None
-    beside = with_function(found.after, sensors, run)
-    return search_beside(found, beside, options, run, extra, progress) if beside.function else None
 
 
 def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
@@ -174,17 +143,17 @@ def _facts(found: SetSearch, again: Recurrence | None) -> SetFacts:
     return SetFacts(_findings(found), after, found.after, again, told, found.told_functions, drawn)
 
 
-def _explained(again: Recurrence, found: SetSearch, labels: Sequence[str]) -> tuple[str, ...]:
+def _explained(again: Recurrence | None, found: SetSearch, labels: Sequence[str]) -> tuple[str, ...]:
     """Say what an unknown function explains, and how likely it is; labels of one recording have its name behind."""
     names = [f"{name} in {recording}" if recording else name for name, recording in map(split_tag, labels)]
     common = next((one for one in found.told_functions if one.is_common), None)
     if common is None:
         return (f"Functions of single recordings also explain {', '.join(names)}: not told.",) if names else ()
     too = (f"It also explains {', '.join(names)}: not told.",) if names else ()
-    of_what = "attitude" if again.apart or not again.answer else listed(again.answer, "or")
+    of_what = "attitude" if again is None or again.apart or not again.answer else listed(again.answer, "or")
     # Where the search went to and fro no probabilities are told.
     share = f" ({in_percent(common.probability)})" if found.stood else ""
-    where = f"{listing(again.sensors)}{share}"
+    where = f"{listing(common.sensors)}{share}"
     return (f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.", *too)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -169,7 +169,7 @@ def fit_set(
     bare = replace(options.model, effects=())
     options = replace(options, model=with_effects(bare, [by_name(e) for e in options.model.effects]))
     progress("recordings", 0.1)
-    jobs = [job_of(member, options, before) for member in members]
+    jobs = [_first_job(member, options, before) for member in members]
     done = run(jobs)
     left = {job.member.name: _why(job.member, d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
     earlier = {r.name: r for r in (before.reports if before else ())}
@@ -211,14 +211,21 @@ def fit_set(
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
         raise DataError(f"only one of {len(members)} recordings can be used: mend or omit the others ({why})")
     fit = _in_shared_scatter(fit, options, run)
-    late = {name: r for name, r in late.items() if name not in left}
-    fit = _noise_of(late, fit, options, run) if late else fit
+    waiting = {*late, *(job.member.name for job in jobs if job.noise == ())} - {*left}
+    fit = _noise_of(waiting, fit, options, run) if waiting else fit
     return replace(fit, left_out=tuple(left.items()), unit_doubt=doubt)
 
 
-def _noise_of(late: Mapping[str, Report], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
-    """Learn the noise of recordings that were linearised about what the others know, now that this stands."""
-    members = [m for m in fit.members if m.name in late]
+def _first_job(member: Member, options: SetOptions, before: SetFit | None) -> Job:
+    """Make the job of a recording with which a fit begins: in white noise until the point stands."""
+    # About a point that lacks what is new in the model noise takes up what that leaves, and the point stays.
+    job = job_of(member, options, before)
+    return job if job.about is None else replace(job, noise=())
+
+
+def _noise_of(names: Collection[str], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
+    """Learn the noise of recordings that were linearised in white noise, now that the point stands."""
+    members = [m for m in fit.members if m.name in names]
     done = run([job_of(m, options, fit) for m in members])
     fresh = {m.name: d for m, d in zip(members, done, strict=True) if not isinstance(d, DataError)}
     return with_reports(fit, [with_own(fresh.get(r.name, r), r) for r in fit.reports])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.diagnosis.search import CERTAIN_NOISE, Search
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import CHANNELS
@@ -19,6 +18,7 @@ from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.noise_term import ATTITUDE, DRAWN, TRIADS, NoiseTerm
+from sdimu_calibration.core.posterior.noise_models import NoiseModel
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share
 
@@ -89,6 +89,8 @@ class SetSearch:
     """The models that all recordings together leave probable."""
     stood: bool
     """The choice stood at the end; False where the search went to and fro, and the window chooses something else."""
+    alone: SetFit
+    """Without a function of the attitude: where the search asked for one, as it stood before that, else `after`."""
 
     @property
     def told(self) -> tuple[Candidate, ...]:
@@ -100,6 +102,11 @@ class SetSearch:
         """Probability of an unknown function of the attitude, in all recordings or in one (1)."""
         return self._of_noise(lambda noise: any(noise.function) or any(map(any, noise.own_functions)))
 
+    @property
+    def function_is_likely(self) -> bool:
+        """Whether it is more likely than not that all recordings or one have an unknown function of the attitude."""
+        return self.any_function > PROBABLE
+
     @cached_property
     def functions(self) -> tuple[FunctionShare, ...]:
         """The function that all recordings share, and that of each alone; empty where none was looked for."""
@@ -108,20 +115,11 @@ class SetSearch:
         own = [self._share(report.name, r) for r, report in enumerate(self.after.reports)]
         return (self._share("", None), *own)
 
-    @cached_property
-    def may_follow_attitude(self) -> tuple[str, ...]:
-        """Sensors of which some recording may have an error that follows the attitude, as its noise."""
-
-        def of(channel: str) -> float:
-            return self._of_noise(lambda noise: any(t.kind == ATTITUDE and channel in t.sensors for t in noise.terms))
-
-        return tuple(channel for channel in CHANNELS if of(channel) > NAMED)
-
     @property
     def told_functions(self) -> tuple[FunctionShare, ...]:
         """Those that are likely; where one is, and it is open whose, the likeliest."""
         likely = tuple(one for one in self.functions if one.likely)
-        if likely or self.any_function <= PROBABLE:
+        if likely or not self.function_is_likely:
             return likely
         return (max(self.functions, key=lambda one: one.probability),)
 
@@ -156,6 +154,21 @@ class SetSearch:
 
     def _of_noise(self, holds: Callable[[SetNoise], bool]) -> float:
         return self.posterior.of_any_noise(lambda noise: isinstance(noise, SetNoise) and holds(noise))
+
+
+def following(window: Posterior[SetEvidence], least: float) -> tuple[str, ...]:
+    """List the sensors of which some recording may have an error that follows the attitude, as its noise.
+
+    Parameters
+    ----------
+    least : float
+        Probability of it (1) above which a sensor counts.
+    """
+
+    def holds(channel: str, noise: NoiseModel) -> bool:
+        return any(term.kind == ATTITUDE and channel in term.sensors for term in noise.terms)
+
+    return tuple(c for c in CHANNELS if window.of_any_noise(partial(holds, c)) > least)
 
 
 def of_one_recording(label: str) -> Candidate:

@@ -22,15 +22,15 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
-from sdimu_calibration.core.joint.function_fit import in_size
+from sdimu_calibration.core.joint.function_fit import in_size, with_function
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
-from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, of_one_recording
+from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, following, of_one_recording
 from sdimu_calibration.core.joint.set_standing import set_standing
-from sdimu_calibration.core.posterior.posterior import Posterior
+from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
 from sdimu_calibration.core.progress import Progress, silent
 
@@ -72,6 +72,15 @@ def search_set(
     return _searched(before, before, (), options, run, extra, progress)
 
 
+def search_without(
+    found: SetSearch, options: SetOptions, run: Run, extra: Sequence[Effect] = (), progress: Progress = silent
+) -> SetSearch:
+    """Search again without the function that a search asked for; what was found is a candidate again."""
+    alone = fit_set(found.before.members, _with(options, found.told), run, found.before, progress)
+    again = _searched(found.before, alone, found.told, options, run, extra, progress, asks=False)
+    return replace(again, first=found.first, threshold=found.threshold)
+
+
 def search_beside(
     found: SetSearch,
     fit: SetFit,
@@ -88,11 +97,7 @@ def search_beside(
         With the function and with what was found.
     """
     again = _searched(found.before, fit, found.told, options, run, extra, progress)
-    shared = again.after.function
-    if shared is not None:
-        told = tuple(s for one in again.told_functions if one.is_common for s in one.sensors)
-        again = replace(again, after=replace(again.after, function=replace(shared, told=told)))
-    return replace(again, first=found.first, threshold=found.threshold)
+    return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
 
 
 def _searched(
@@ -103,9 +108,17 @@ def _searched(
     run: Run,
     extra: Sequence[Effect],
     progress: Progress,
+    asks: bool = True,
 ) -> SetSearch:
-    """Search about a fit with what is told, until the choice stands."""
-    members = before.members
+    """Search about a fit with what is told, until the choice stands.
+
+    Parameters
+    ----------
+    asks : bool
+        Put a function of the attitude beside the fit as soon as some recording is likely to have one: effects that are
+        chosen without it would be parts of it, one after the other.
+    """
+    members, alone = before.members, None
     finer: tuple[Effect, ...] = ()
     seen: set[frozenset[str]] = {frozenset(c.label for c in told)}
     found: Search[SetEvidence] | None = None
@@ -119,6 +132,10 @@ def _searched(
         names = {c.label: evidence.names[column] for c, column in zip(tried, columns.tolist(), strict=True)}
         boards, limit = partial(SetBoard, full, names), first.threshold if first else None
         found = search(again, _singles(again), None, FALSE_ALARM, limit, found, tell_noise=False, make=boards)
+        beside = _beside_function(fit, found, run) if asks else fit
+        if beside is not fit:
+            first, found, alone, fit = first or with_steps(found), None, alone or fit, beside
+            continue
         found = with_steps(found)
         first = first or found
         chosen = _first_ones(fit, found, told)
@@ -135,7 +152,17 @@ def _searched(
         fit = in_size(fit_set(members, _with(options, told), run, fit, progress))
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
-    return _result(before, fit, told, evidence, (first, found), stood)
+    result = _result(before, fit, told, evidence, (first, found), stood)
+    return result if alone is None else replace(result, alone=alone)
+
+
+def _beside_function(fit: SetFit, found: Search[SetEvidence], run: Run) -> SetFit:
+    """Put a function of the attitude beside a fit for all sensors that are likely to have one in some recording."""
+    likely = () if found.posterior is None else following(found.posterior, PROBABLE)
+    have = () if fit.function is None else fit.function.sensors
+    if set(likely) <= set(have):
+        return fit
+    return with_function(fit, (*have, *likely), run)
 
 
 def _result(
@@ -161,7 +188,7 @@ def _result(
         for c in told
         if c.recording
     )
-    return SetSearch(
+    result = SetSearch(
         before,
         fit,
         tuple(shared.values()),
@@ -175,7 +202,13 @@ def _result(
         set_standing(fit, evidence if shared else set_evidence(fit, ()), shared, alike),
         window,
         stood,
+        fit,
     )
+    function = fit.function
+    if function is None:
+        return result
+    common = tuple(s for one in result.told_functions if one.is_common for s in one.sensors)
+    return replace(result, after=replace(fit, function=replace(function, told=common)))
 
 
 def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:

@@ -1,0 +1,78 @@
+"""Search a set with and without an unknown function of the attitude, and say what comes back of what is left.
+
+The search asks for a function itself where one is likely before anything was chosen. Here it is also asked for where it
+is only possible at the end, or where what is left may come back with the attitude; and it is left out where it turns
+out not to be likely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from sdimu_calibration.core.diagnosis.grades import NAMED
+from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.joint.function_fit import with_function
+from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
+from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
+from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
+from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch, following
+from sdimu_calibration.core.joint.set_search import search_beside, search_set, search_without
+from sdimu_calibration.core.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a set shows."""
+
+    found: SetSearch
+    """Beside a function of the attitude where one is likely, of all recordings or of one."""
+    without: SetSearch | None
+    """Before a function was asked for, where `found` stands beside one; None where no search ended without it."""
+    again: Recurrence | None
+    """What comes back of what is left without a function; None where nothing is left."""
+    functions: tuple[FunctionShare, ...]
+    """How probable a function is in all recordings, then in each alone; empty where none was weighed to the end."""
+
+    @property
+    def beside_function(self) -> bool:
+        """Whether some function of the attitude is likely."""
+        return self.found.after.function is not None
+
+
+def searched(
+    members: Sequence[Member],
+    options: SetOptions,
+    run: Run,
+    extra: Sequence[Effect] = (),
+    progress: Progress = silent,
+    fitted: SetFit | None = None,
+) -> Searched:
+    """Search a set; parameters as for `search_set`."""
+    found = search_set(members, options, run, extra, progress, fitted=fitted)
+    beside = found if found.after.function is not None else None
+    if beside is not None and not beside.function_is_likely:
+        found = search_without(beside, options, run, extra, progress)
+    again = recurrence(leftovers(found.alone, run))
+    if beside is None and again is not None:
+        # Some recording may have an error that follows the attitude, or what is left may come back with it.
+        returns = again.sensors if again.may_come_back(ATTITUDE) else ()
+        fit = with_function(found.after, following(found.posterior, NAMED) or returns, run)
+        beside = search_beside(found, fit, options, run, extra, progress) if fit.function else None
+    if beside is None:
+        return Searched(found, None, again, ())
+    functions = beside.functions if beside.stood else ()
+    again = None if again is None else _judged(again, beside)
+    if not beside.function_is_likely:
+        return Searched(found, None, again, functions)
+    return Searched(beside, None if beside is found else found, again, functions)
+
+
+def _judged(again: Recurrence, beside: SetSearch) -> Recurrence:
+    """Take the probability of the attitude from all rows, in the place of that which stops tell."""
+    common = beside.functions[0]
+    # Where kinds look the same, rows that tell of the attitude say nothing of the others.
+    if again.apart and beside.stood:
+        again = again.judged(ATTITUDE, common.probability)
+    return replace(again, sensors=common.sensors) if beside.function_is_likely and common.likely else again
