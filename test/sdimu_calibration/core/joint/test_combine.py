@@ -64,7 +64,8 @@ def test_likelihood_is_the_density_of_the_data():
         return -0.5 * (np.linalg.slogdet(S)[1] + y @ np.linalg.solve(S, y))
 
     sizes = [1e-9, 2e-8, 1e-7]
-    ours = [combined.log_likelihood(np.array([tau])) for tau in sizes]
+    line = combined.along(0, np.array([np.nan]))
+    ours = [line.log_likelihood(tau) for tau in sizes]
     np.testing.assert_allclose(np.diff(ours), np.diff([density(tau) for tau in sizes]), rtol=1e-6)
 
 
@@ -154,6 +155,9 @@ def test_a_set_of_any_shape_is_all_parameters_and_deviations_at_once():
         np.testing.assert_allclose(found.deviation_sigma, sigma, rtol=1e-6, atol=1e-6)
         # Parameters have units of their own here, whose determinant is no part of the likelihood.
         assert found.log_likelihood + np.log(combined.unit).sum() == pytest.approx(density, abs=1e-6)
+        for k, sigma_of_one in enumerate(tau):
+            told = combined.along(k, tau).log_likelihood(float(sigma_of_one))
+            assert told == pytest.approx(found.log_likelihood, abs=1e-6)
 
 
 @pytest.mark.parametrize("weaker", [1e-2, 1e-4, 1e-6])

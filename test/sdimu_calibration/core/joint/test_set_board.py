@@ -37,6 +37,20 @@ def log_likelihood(one, weight, p):
     return 0.5 * (one.explained + d @ np.linalg.solve(A, d) - log_det)
 
 
+@pytest.mark.parametrize(("likeliest", "of_none", "chosen"), [(3, 20.0, 3), (14, 20.0, 14), (3, 90.0, 0)])
+@pytest.mark.parametrize("begun", [0, 1, 12])
+def test_a_size_far_from_that_of_the_fit_is_found_though_none_is_better_than_those_between(
+    likeliest, of_none, chosen, begun
+):
+    board = object.__new__(SetBoard)
+    board.rivals, board._counts = ((),), (1, 16)
+
+    def score(choice):
+        return of_none if choice[1] == 0 else 80.0 - 10.0 * abs(choice[1] - likeliest)
+
+    assert board._best_at((0, begun), 1, score) == (0, chosen)
+
+
 def test_noises_of_one_recording_are_as_likely_as_its_own_board_says():
     test = unit_set(35, [short()], noise=WALK).members[0].open()
     fit = solve(test, load_model("baseline"))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.joint.member import Member, fitted, run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
@@ -16,6 +17,7 @@ from sdimu_calibration.core.noise_term import may_be_an_effect
 from sdimu_calibration.core.note import Topic, topic_of
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.score import baseline_z
@@ -158,6 +160,20 @@ def test_recordings_that_the_model_does_not_fit_are_named_though_learned_noise_t
     line = next(text for text in set_outcome(fit).warnings if "does not fit" in text)
     assert [r.name for r in fit.reports if f"{r.name}: " in line] == odd
     assert line.endswith("run: sdimu diagnose")
+
+
+def test_what_a_strong_effect_leaves_at_an_earlier_point_is_no_noise_beside_it(options):
+    hidden = {"accel_quadratic_y": to_si(800.0, "ug/g^2"), "gyro_scale_asymmetry_y": 120e-6}
+    some = unit_set(37, [short()] * 2, ("accel_quadratic_y=800 ug/g^2", "gyro_scale_asymmetry_y=120 ppm"))
+    before = fit_set(some.members, options, here)
+    assert all(report.noise for report in before.reports)
+    fit = fit_set(some.members, replace(options, model=with_effects(options.model, [*hidden])), here, before)
+    for report in fit.reports:
+        assert report.noise == ()
+        assert report.statistics.nis_mean == pytest.approx(1.0, abs=0.15)
+    for name, true in hidden.items():
+        place = fit.names.index(name)
+        assert fit.estimate.values[place] == pytest.approx(true, abs=4.0 * fit.estimate.covariance[place, place] ** 0.5)
 
 
 def test_a_prior_that_holds_all_recordings_back_is_no_scatter():

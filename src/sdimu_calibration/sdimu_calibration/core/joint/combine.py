@@ -77,6 +77,41 @@ class JointEstimate:
     """Restricted: the parameters of the set are integrated over their priors."""
 
 
+@dataclass(frozen=True)
+class Line:
+    """Restricted log-likelihood of one component's sigma, those of the others given.
+
+    Rows ``A theta = y`` of the parameters of the set, each with the variance ``1 + square sigma^2``.
+    """
+
+    constant: float
+    """What does not depend on the sigma (1)."""
+    A: Floats
+    """Shape (n, P); parameters in their units."""
+    y: Floats
+    """Shape (n,)."""
+    square: Floats
+    """Shape (n,). 1/SI^2."""
+    rest: Information
+    """Of the rows that see no deviation."""
+    weight: Floats
+    """Prior information of the parameters, shape (P,)."""
+
+    def log_likelihood(self, sigma: float) -> float:
+        """Restricted log-likelihood.
+
+        Parameters
+        ----------
+        sigma : float
+            Of the component (SI).
+        """
+        variance = 1.0 + self.square * sigma**2
+        known = self.A / variance[:, None]
+        constant = self.constant - 0.5 * float(np.log(variance).sum() + self.y**2 @ (1.0 / variance))
+        information = Information(self.rest.J + known.T @ self.A, self.rest.d + known.T @ self.y)
+        return constant + information.log_likelihood(self.weight)
+
+
 class Combination:
     """All power-ons of a set, ready to be combined for any size of what varies.
 
@@ -127,17 +162,6 @@ class Combination:
         J = np.sum((self.A[:, :, columns] / self.unit[columns]) ** 2, axis=1)
         return float(np.median(1.0 / np.sqrt(J[J > 0.0]))) if J.any() else float("inf")
 
-    def log_likelihood(self, tau: Floats) -> float:
-        """Restricted log-likelihood of the sigmas.
-
-        Parameters
-        ----------
-        tau : ndarray, shape (c,)
-            SI.
-        """
-        constant, information = self.integrated(tau)
-        return constant + information.log_likelihood(self.weight)
-
     def integrated(self, tau: Floats) -> tuple[float, Information]:
         """Integrate the deviations of all power-ons.
 
@@ -173,6 +197,35 @@ class Combination:
         determinant = np.log(np.abs(np.diagonal(U, axis1=1, axis2=2))).sum()
         constant = 0.5 * float(np.sum(first[:, :, -1] ** 2)) - float(determinant)
         return constant, Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y), U, first
+
+    def along(self, component: int, tau: Floats) -> Line:
+        """Integrate the deviations of all components but one, whose sigma may then be anything.
+
+        Parameters
+        ----------
+        component : int
+            That one.
+        tau : ndarray, shape (c,)
+            Sigma of each component (SI); of that one it does not matter.
+        """
+        counts = [len(c.columns) for c in self.components]
+        own = np.repeat(np.arange(len(counts)) == component, counts)
+        R = self.A[:, :, self.varying] * np.where(own, 1.0 / self.unit[self.varying], self.sizes(tau))
+        others = int(np.count_nonzero(~own))
+        rows = np.concatenate([R[:, :, ~own], R[:, :, own], self.A, self.y[:, :, None]], axis=2)
+        prior = np.zeros((len(rows), others, rows.shape[2]))
+        prior[:, range(others), range(others)] = 1.0
+        T = np.asarray(np.linalg.qr(np.concatenate([rows, prior], axis=1), mode="r"))
+        determinant = np.log(np.abs(np.diagonal(T[:, :others, :others], axis1=1, axis2=2))).sum()
+        rest, v = T[:, others:, others:], int(np.count_nonzero(own))
+        # Turned so that each row sees one combination of the deviations of its power-on, or none.
+        turn, seen, _ = np.linalg.svd(rest[:, :, :v])
+        turned = np.swapaxes(turn, 1, 2) @ rest[:, :, v:]
+        square = np.zeros(turned.shape[:2])
+        square[:, : seen.shape[1]] = seen**2
+        constant = 0.5 * float(np.sum(T[:, :others, -1] ** 2) + np.sum(turned[:, :, -1] ** 2)) - float(determinant)
+        A, y = turned[:, :, :-1].reshape(-1, len(self.unit)), turned[:, :, -1].ravel()
+        return Line(constant, A, y, square.ravel(), Information(self.J_rest, self.d_rest), self.weight)
 
     def estimate(self, tau: Floats) -> JointEstimate:
         """Estimate all parameters and deviations, the sigmas given.

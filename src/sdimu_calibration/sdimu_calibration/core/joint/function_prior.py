@@ -19,8 +19,9 @@ from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.noise_term import ATTITUDE, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import ODDS, SENSORS, Sizes
 
-_STEPS = np.arange(-2.0, 5.0)
-"""Powers of `_RATIO` by which sizes differ from that of the fit (1): what is told falsely takes most of a function."""
+_STEPS = np.arange(-10.0, 5.0)
+"""Powers of `_RATIO` by which sizes differ from that of the fit (1). Up: what is told falsely takes most of a function.
+Down: where recordings have functions of their own, one that they must share is larger by a factor of hundreds."""
 _RATIO = 2.0
 """Ratio of neighbouring sizes (1): of a hundred weights the size is known to a tenth, of ten to a third."""
 _NONE = 1e-3

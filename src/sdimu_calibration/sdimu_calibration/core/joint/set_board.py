@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -189,7 +189,7 @@ class SetBoard(Board[SetEvidence]):
             for _ in range(_SWEEPS):
                 before = best
                 for k in range(len(self._counts)):
-                    best = max((_changed(best, k, other) for other in self._others(k, best[k])), key=score)
+                    best = self._best_at(best, k, score)
                 if best == before:
                     break
             return best
@@ -202,14 +202,23 @@ class SetBoard(Board[SetEvidence]):
                 return found
             best = swept(together)
 
-    def _others(self, place: int, now: int) -> list[int]:
-        """Say what may stand at a place of a choice: any noise of a recording; of sizes none, this one and the next."""
+    def _best_at(self, now: tuple[int, ...], place: int, score: Callable[[tuple[int, ...]], float]) -> tuple[int, ...]:
+        """Choose the best for one place: any noise of a recording; of sizes none, or where those next to it are worse.
+
+        The likelihood has one maximum in the size.
+        """
         count = self._counts[place]
-        if place < len(self.rivals):
-            return list(range(count))
-        # The likelihood has one maximum in the size.
-        near = {now - 1, now, now + 1} if now else {OF_FIT}
-        return sorted({0, *(k for k in near if 0 <= k < count)})
+        if place < len(self.rivals) or count == 1:
+            return max((_changed(now, place, other) for other in range(count)), key=score)
+        best = now if now[place] else _changed(now, place, OF_FIT)
+        for step in (-1, 1):
+            # A size that none is better than may be far from the likeliest one.
+            while 1 <= best[place] + step < count:
+                next_one = _changed(best, place, best[place] + step)
+                if score(next_one) <= score(best):
+                    break
+                best = next_one
+        return max(best, _changed(now, place, 0), key=score)
 
     def _begun(self) -> list[tuple[int, ...]]:
         """Choices to begin with: white noise, beside no function, a common one, and one of each recording."""

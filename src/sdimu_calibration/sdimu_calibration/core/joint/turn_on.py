@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.joint.combine import Combination, JointEstimate
+from sdimu_calibration.core.joint.combine import Combination, JointEstimate, Line
 from sdimu_calibration.core.results import TurnOn
 from sdimu_calibration.core.variances import FALL, crossing
 
@@ -42,7 +42,7 @@ def turn_on_scatter(combined: Combination) -> tuple[TurnOn, ...]:
     tau = np.where(np.isfinite(scale), scale, 0.0)
     for _ in range(_SWEEPS if len(tau) > 1 else 1):
         for k in range(len(tau)):
-            tau[k] = _best(combined, tau, k, scale[k])
+            tau[k] = _best(combined.along(k, tau), scale[k])
     return tuple(_with_interval(combined, tau, k, scale[k]) for k in range(len(tau)))
 
 
@@ -78,7 +78,8 @@ def _open_sigmas(combined: Combination, tau: Floats, k: int, found: TurnOn) -> t
     if not np.isfinite(found.high):
         return tau[k : k + 1], np.ones(1)
     grid = (np.arange(_OPEN) + 0.5) * _WIDEST * found.high / _OPEN
-    likelihood = np.array([_profile(combined, tau, k, size) for size in grid])
+    line = combined.along(k, tau)
+    likelihood = np.array([line.log_likelihood(size) for size in grid.tolist()])
     weight = np.exp(likelihood - likelihood.max())
     return grid, weight / weight.sum()
 
@@ -89,38 +90,35 @@ def _with(tau: Floats, k: int, size: float) -> Floats:
     return trial
 
 
-def _profile(combined: Combination, tau: Floats, k: int, size: float) -> float:
-    return combined.log_likelihood(_with(tau, k, size))
-
-
-def _best(combined: Combination, tau: Floats, k: int, scale: float) -> float:
+def _best(line: Line, scale: float) -> float:
     """Sigma (SI) of one component that the others leave most likely; 0 where none is likelier."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 (0.2 s that a single recording does not need)
 
     if not np.isfinite(scale):
         return 0.0
     grid = np.log(scale * np.geomspace(_SMALLEST, _LARGEST, _GRID))
-    values = [_profile(combined, tau, k, float(np.exp(x))) for x in grid]
+    values = [line.log_likelihood(float(np.exp(x))) for x in grid]
     top = int(np.argmax(values))
     if top == 0:
         return 0.0
     found = minimize_scalar(
-        lambda x: -_profile(combined, tau, k, float(np.exp(x))),
+        lambda x: -line.log_likelihood(float(np.exp(x))),
         bounds=(grid[top - 1], grid[min(top + 1, _GRID - 1)]),
         method="bounded",
         options={"xatol": 1e-3},
     )
-    return float(np.exp(found.x)) if -found.fun > _profile(combined, tau, k, 0.0) else 0.0
+    return float(np.exp(found.x)) if -found.fun > line.log_likelihood(0.0) else 0.0
 
 
 def _with_interval(combined: Combination, tau: Floats, k: int, scale: float) -> TurnOn:
     effect = combined.components[k].effect
     if not np.isfinite(scale):
         return TurnOn(effect, 0.0, 0.0, float("inf"), len(combined.y))
-    limit = _profile(combined, tau, k, tau[k]) - FALL
+    line = combined.along(k, tau)
+    limit = line.log_likelihood(float(tau[k])) - FALL
 
     def above(x: float) -> float:
-        return _profile(combined, tau, k, float(np.exp(x))) - limit
+        return line.log_likelihood(float(np.exp(x))) - limit
 
     bottom, end = np.log(scale * _SMALLEST), np.log(scale * _LARGEST)
     begin, low, high = max(np.log(tau[k]), bottom) if tau[k] > 0.0 else bottom, 0.0, float("inf")
