@@ -34,8 +34,8 @@ def test_a_plan_tells_something_of_every_grade_and_the_filter_reaches_the_bound(
 @pytest.mark.parametrize("grade", GRADES)
 def test_every_grade_is_calibrated_within_its_sigma(grade):
     imu = load_imu(grade)
-    recording, truth = generate(Scenario(PLAN, imu, SITE, seed=3))
-    found = calibrate(recording, SITE, imu, MODEL, estimator="batch")
+    recording, truth = generate(Scenario(PLAN, imu, SITE, seed=3, rate_hz=20.0))
+    found = calibrate(recording, SITE, imu, MODEL, estimator="batch", held_out=False)
     true = in_body_frame(truth.imu.coefficients, found.body_frame)
     off = np.array([value - true[name] for name, value in zip(found.names, found.values, strict=True)])
     sigma = np.sqrt(np.diag(found.covariance))

