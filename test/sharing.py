@@ -26,11 +26,19 @@ TOGETHER = {
     "test/ros/test_layouts.py": "test/ros/test_whole_run.py",
     "test/ros/test_transforms.py": "test/ros/test_whole_run.py",
     "test/sdimu_calibration/core/diagnosis/test_assumed.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/diagnosis/test_averaged.py": _DIAGNOSES,
     "test/sdimu_calibration/core/diagnosis/test_coefficient_shifts.py": _DIAGNOSES,
     "test/sdimu_calibration/core/diagnosis/test_grades.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/diagnosis/test_traps.py": _DIAGNOSES,
     "test/sdimu_calibration/core/posterior/test_coefficients.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/posterior/test_excess.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/posterior/test_open_noise.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/posterior/test_search_again.py": _DIAGNOSES,
+    "test/sdimu_calibration/core/posterior/test_unknown.py": _DIAGNOSES,
+    "test/sdimu_study/test_noise_run.py": "test/sdimu_study/test_believed.py",
+    "test/sdimu_study/test_reliability.py": "test/sdimu_study/test_ahead.py",
 }
-"""Files that go to the worker of another one, with which they share a whole run over DDS, or diagnoses of `bench`."""
+"""Files that go to the worker of another one, with which they share a run over DDS, or fits and diagnoses."""
 
 DOMAINS_A_RUN = 4
 """Number of ROS domains that a parallel run of tests takes, from its first one; with more workers some share."""
@@ -40,6 +48,7 @@ LONGEST = (
     "test/book/test_blocks.py",
     "test/sdimu_calibration/core/diagnosis/test_diagnose.py",
     "test/sdimu_calibration/core/joint/test_set_search.py",
+    "test/sdimu_calibration/core/joint/test_function_fit.py",
     "test/sdimu_calibration/report/workbench/test_workbench.py",
     "test/browser/test_report_in_a_browser.py",
     "test/browser/test_live_page_in_a_browser.py",
@@ -49,6 +58,8 @@ LONGEST = (
     "test/sdimu_calibration/core/estimation/test_every_estimator.py",
     "test/sdimu_calibration/cli/test_terminal.py",
     "test/sdimu_calibration/core/diagnosis/test_strong_flicker.py",
+    "test/sdimu_calibration/core/diagnosis/test_unknown_attitude.py",
+    "test/sdimu_calibration/core/posterior/test_near.py",
     "test/sdimu_calibration/core/joint/test_shared_scatter.py",
     "test/sdimu_calibration/storage/test_matlab_objects.py",
     "test/sdimu_calibration/core/test_live_end.py",
@@ -75,6 +86,11 @@ LONGEST = (
     "test/sdimu_calibration/core/estimation/test_free_azimuth.py",
     "test/sdimu_calibration/core/posterior/test_likely_noise.py",
     "test/sdimu_study/test_hand_run.py",
+    "test/sdimu_study/test_believed.py",
+    "test/sdimu_study/test_ahead.py",
+    "test/sdimu_study/test_soak_run.py",
+    "test/sdimu_study/test_campaign.py",
+    "test/sdimu_study/test_disturbed_run.py",
     "test/sdimu_calibration/core/joint/test_set_fit.py",
     "test/sdimu_calibration/cli/test_exit_status.py",
     "test/sdimu_calibration/core/diagnosis/test_pairs.py",

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
 
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
-from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_study.ahead import MISSED, ahead
-from sdimu_study.worlds import OneTest, diagnosed, simulated_test
 
 NAMES = ("accel_quadratic_z", "gyro_bias_warm_up_y")
 
 
 @pytest.fixture(scope="module")
-def found():
-    hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_warm_up_y(tau=300 s)=0.07 deg/h")
-    site = Site(math.radians(36.4), 0.0)
-    test, sensor = simulated_test("dtg", load_imu("dtg"), "recommended", site, 12, hidden)
-    return diagnosed(OneTest(test, load_model("baseline"), sensor)).found.posterior
+def found(two_found):
+    return two_found.found.posterior
 
 
 def test_what_is_found_is_no_less_likely_than_the_truth(found):

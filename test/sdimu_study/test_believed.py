@@ -7,15 +7,12 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.noise_term import TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.noise_models import MARKOV_S, MARKOV_SPREAD, ODDS, usual_sizes
-from sdimu_calibration.core.specification import Site
-from sdimu_calibration.storage.files.config import load_imu, load_model
+from sdimu_calibration.storage.files.config import load_imu
 from sdimu_sim.core.coloured import KINDS, parse_noise
 from sdimu_sim.core.hidden import one_sided, parse_effects
 from sdimu_study.believed import BelievedEffects, believed_count, believed_noise
-from sdimu_study.worlds import simulated_test
 
 WORLDS = 4000
 
@@ -58,12 +55,6 @@ def test_each_kind_of_noise_is_as_frequent_and_as_large_as_the_prior_believes():
     assert abs(np.std(late) - 1.0) < 4.0 / np.sqrt(2.0 * len(late))
     short = [parse_noise(text) for _ in range(500) for text in believed_noise(imu, 600.0, rng)]
     assert 100.0 < max(key.tau for key in short) <= 200.0
-
-
-@pytest.fixture(scope="module")
-def fit():
-    test, _ = simulated_test("dtg", load_imu("dtg"), "kim18_signed", Site(0.6, 0.0), 5, ())
-    return solve(test, load_model("baseline"))
 
 
 def test_effects_are_drawn_of_the_prior_and_the_simulator_reads_them(fit):

@@ -51,10 +51,10 @@ def test_runs_by_hand_have_no_plan():
     assert plans_of("dtg") == PLANS
 
 
-def test_a_clean_test_in_ten_minutes_is_consistent():
+@pytest.mark.parametrize("seed", [55_003, *(pytest.param(more, marks=pytest.mark.slow) for more in (55_004, 55_016))])
+def test_a_clean_test_in_ten_minutes_is_consistent(seed):
     """This grade and plan named an effect in seven of seventeen tests while the force was taken as measured."""
-    rows = [STUDY.of(("fog_tactical", "kim18_10_min"))(seed) for seed in (55003, 55004, 55016)]
-    assert [row["verdict"] for row in rows] == ["consistent"] * 3
+    assert STUDY.of(("fog_tactical", "kim18_10_min"))(seed)["verdict"] == "consistent"
 
 
 def test_the_page_counts_effects_noise_and_refusals_apart():

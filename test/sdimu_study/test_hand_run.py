@@ -19,7 +19,7 @@ SEEDS = (71, 72, 73)
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 
 
-@pytest.mark.parametrize("seed", SEEDS[:2])
+@pytest.mark.parametrize("seed", [SEEDS[0], pytest.param(SEEDS[1], marks=pytest.mark.slow)])
 def test_clean_runs_are_clean_and_their_attitudes_are_counted_once(seed):
     row = STUDY.of((CLEAN,))(seed)
     assert row["verdict"] == "consistent", row["sentence"]
@@ -28,6 +28,11 @@ def test_clean_runs_are_clean_and_their_attitudes_are_counted_once(seed):
 
 
 def test_a_hidden_effect_is_named():
+    assert STUDY.of((HIDDEN,))(SEEDS[0])["in_class"]
+
+
+@pytest.mark.slow
+def test_a_hidden_effect_is_named_in_most_runs():
     rows = [STUDY.of((HIDDEN,))(seed) for seed in SEEDS]
     assert sum(row["in_class"] for row in rows) >= 2
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.specification import Site
@@ -16,9 +15,7 @@ from sdimu_study.noise import STUDY, NoiseCase, page, seen_noise
 from sdimu_study.worlds import OneTest, diagnosed, drawn_effect, simulated_test
 
 
-def test_an_effect_of_ten_sigma_is_larger_where_noise_wanders():
-    imu = load_imu("dtg")
-    fit = solve(simulated_test("dtg", imu, "kim18_signed", Site(0.6, 0.0), 5, ())[0], load_model("baseline"))
+def test_an_effect_of_ten_sigma_is_larger_where_noise_wanders(fit):
     walk = NoiseTerm("gyro", "random_walk", size=np.deg2rad(0.1) / 3600.0 / 60.0)
     none = NoiseTerm("gyro", "random_walk", size=1e-9 * walk.size)
     ratios = {}

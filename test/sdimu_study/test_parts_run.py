@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sdimu_study.parts import STUDY, run, world
+from sdimu_study.parts import run, score, world
 
 
 def test_parts_are_of_one_power_on_and_follow_each_other():
@@ -19,6 +19,6 @@ def test_both_ways_differ_and_the_sigmas_of_the_shared_scatter_hold():
     one = world(("mems_by_hand",), 94_903)
     found = run(one)
     assert not np.array_equal(found["shared"].covariance, found["own"].covariance)
-    row = STUDY.of(("mems_by_hand",))(94_903)["shared"]
+    row = score(one, found)["shared"]
     # Some twenty errors over sigma: their root scatters by a sixth about one.
     assert 0.4 < (row["z2"] / row["count"]) ** 0.5 < 1.6
