@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 import pytest
@@ -30,6 +30,20 @@ class InMemory:
 
     def __init__(self, test: PreparedTest) -> None:
         self.test = test
+
+    def __call__(self) -> PreparedTest:
+        return self.test
+
+
+class Simulated:
+    """Opens a test that is simulated when it is opened first: of some sets one recording alone is used."""
+
+    def __init__(self, make: Callable[[], PreparedTest]) -> None:
+        self.make = make
+
+    @cached_property
+    def test(self) -> PreparedTest:
+        return self.make()
 
     def __call__(self) -> PreparedTest:
         return self.test
@@ -96,7 +110,8 @@ def unit_set(
     for k, plan in enumerate(plans):
         own = tuple((shift or {}).get(k, {}).items())
         heat = temperature[k] if temperature else None
-        members.append(Member(f"r{k}", InMemory(_recorded(seed, k, plan, effects, own, None, k, noise, heat))))
+        make = partial(_recorded, seed, k, plan, effects, own, None, k, noise, heat)
+        members.append(Member(f"r{k}", Simulated(make)))
     return UnitSet(tuple(members), draw_coefficients(IMU, seed))
 
 
