@@ -25,7 +25,7 @@ FORMATS = OTHERS | FLEET_FORMATS
 
 LONGEST_S = 10.0
 """Time (s) of one case beyond which it hangs: the slowest sound file takes one."""
-SHORT = {"MAT": 4, "MAT, packed": 4, "MAT, timetable": 4, "MAT, 7.3": 4, "bag, SQLite": 15}
+SHORT = {"MAT": 4, "MAT, packed": 4, "MAT, timetable": 4, "MAT, 7.3": 4, "bag, SQLite": 8}
 """Cases in the short run; those with a process of their own take half a second each."""
 LONG = {
     "MAT": 250,
@@ -97,7 +97,7 @@ def run(name: str, number: int, folder: Path) -> tuple[Counter[str], list[str]]:
 
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_a_damaged_file_is_told_or_read_right(name, tmp_path):
-    counts, bad = run(name, SHORT.get(name, 40), tmp_path)
+    counts, bad = run(name, SHORT.get(name, 20), tmp_path)
     assert bad == []
     # Damage that changes nothing tries nothing.
     assert counts["told"] + counts["read"] > 0.5 * sum(counts.values())
