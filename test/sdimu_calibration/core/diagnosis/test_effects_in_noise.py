@@ -22,9 +22,10 @@ from sdimu_study.worlds import in_the_mean, simulate
 FLICKER = ("gyro_noise_flicker=0.01 deg/h", "accel_noise_flicker=2 ug")
 
 
-def world(effects=(), noise=(), seed=1):
+def world(effects=(), noise=(), seed=1, stops=19):
+    plan = load_plan("kim18_signed")
     scenario = Scenario(
-        load_plan("kim18_signed"),
+        replace(plan, dwell_s=plan.dwell_s[:stops], turns=plan.turns[: stops - 1]),
         load_imu("dtg"),
         Site(math.radians(36.4), 0.0),
         rate_hz=20.0,
@@ -42,7 +43,8 @@ def rms_z(result, sensor):
 
 
 def test_an_effect_in_flicker_noise_is_named_and_the_noise_is_not():
-    test, sensor = world(("accel_quadratic_x=60 ug/g^2",), FLICKER)
+    # The first stops show it beyond twenty of its sigmas.
+    test, sensor = world(("accel_quadratic_x=60 ug/g^2",), FLICKER, stops=13)
     found = climb(solve(test, load_model("baseline")))
     assert [c.label for c in found.chosen] == ["accel_quadratic_x"]
     assert {term.triad for term in found.found.noise} == {"gyro", "accel"}
