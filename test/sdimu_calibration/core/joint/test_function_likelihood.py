@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
-from sdimu_calibration.core.joint.function_fit import function_sizes
-from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior
+from sdimu_calibration.core.joint.function_fit import function_sizes, with_own_weights
+from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior, OwnWeights
 from sdimu_calibration.core.joint.reduction import Reduction
 from sdimu_calibration.core.joint.set_board import Share, beside_own
 from sdimu_calibration.core.joint.shared_function import SharedFunction
@@ -139,3 +139,24 @@ def test_a_set_without_a_function_has_no_sizes():
     assert prior.counts == ()
     assert prior.log_prior(()) == 0.0
     assert len(prior.change(()).columns) == 0
+
+
+def test_rows_with_weights_of_their_own_are_those_with_the_covariance_of_the_function():
+    rng = np.random.default_rng(11)
+    labels, p = SHARED.labels, len(NAMES)
+    names, point = (*NAMES, *labels), np.concatenate([np.zeros(p), rng.standard_normal(len(labels))])
+    A, y = rng.standard_normal((20, len(names) + 1)), rng.standard_normal(20)
+    rows = Reduction(names, ("candidate",), A, y, point, np.concatenate([WEIGHT, SHARED.known]), 20, 0.0)
+    of_sensor = [k for k, label in enumerate(labels) if label.startswith("accel_y")]
+    own = OwnWeights(tuple(labels[k] for k in of_sensor), np.array([0.7, 2.0]))
+    found = with_own_weights(rows, "r1", own)
+    assert found.names == (*NAMES, *(f"{label}@r1" for label in own.labels))
+    assert found.labels == ("candidate",)
+    # Integrated over their prior the rows have the covariance of the function of that sensor; the other has none.
+    told, of_own = found.A[:, [*range(p), -1]], found.A[:, p:-1]
+    covariance = np.eye(20) + (of_own / found.weight[p:]) @ of_own.T
+    columns = A[:, p + np.array(of_sensor)]
+    np.testing.assert_allclose(covariance, np.eye(20) + columns * own.size**2 @ columns.T, rtol=1e-12)
+    np.testing.assert_array_equal(told, A[:, [*range(p), -1]])
+    np.testing.assert_array_equal(found.point[p:], point[p + np.array(of_sensor)])
+    np.testing.assert_array_equal(found.weight[:p], WEIGHT)

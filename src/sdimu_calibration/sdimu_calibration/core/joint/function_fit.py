@@ -18,8 +18,11 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.attitude_functions import covering
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.combine import Combination
+from sdimu_calibration.core.joint.function_prior import OwnWeights
 from sdimu_calibration.core.joint.leftovers import with_places
 from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.reduction import Reduction
+from sdimu_calibration.core.joint.scope import tagged
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, columns_of, grouped_rows, with_reports
 from sdimu_calibration.core.joint.shared_function import SharedFunction, is_weight
 from sdimu_calibration.core.noise_term import ATTITUDE, AXES, TRIADS
@@ -69,6 +72,46 @@ def in_size(fit: SetFit) -> SetFit:
         return replace(report, reduction=replace(rows, weight=np.array([known.get(n, w) for n, w in pairs])))
 
     return with_reports(replace(fit, function=shared), [in_prior(r) for r in fit.reports])
+
+
+def with_own_functions(fit: SetFit, own: Sequence[OwnWeights]) -> SetFit:
+    """Fit a set in which no function is common, and recordings have functions of their own.
+
+    A common one that recordings must share against what they say has weights hundreds of times too large, and leaves
+    the coefficients of its sensor as wide.
+
+    Parameters
+    ----------
+    fit : SetFit
+        Beside a common function.
+    own : sequence of OwnWeights
+        Of each recording, in the order of the reports.
+    """
+    reports = [
+        replace(report, reduction=with_own_weights(report.reduction, report.name, weights))
+        for report, weights in zip(fit.reports, own, strict=True)
+    ]
+    return with_reports(fit, reports)
+
+
+def with_own_weights(rows: Reduction, recording: str, own: OwnWeights) -> Reduction:
+    """Give a recording weights of its own in the place of common ones; those that it does not have are none.
+
+    Parameters
+    ----------
+    recording : str
+        Its name, which its own weights have behind theirs.
+    """
+    size = dict(zip(own.labels, own.size.tolist(), strict=True))
+    kept = [k for k, name in enumerate(rows.names) if not is_weight(name) or name in size]
+    every = [(rows.names[k], float(rows.weight[k])) for k in kept]
+    return replace(
+        rows,
+        names=tuple(tagged(name, recording) if name in size else name for name, _ in every),
+        A=rows.A[:, [*kept, *range(len(rows.names), rows.A.shape[1])]],
+        point=rows.point[kept],
+        weight=np.array([size[name] ** -2.0 if name in size else known for name, known in every]),
+    )
 
 
 def unknown_functions(fit: SetFit) -> tuple[UnknownFunction, ...]:

@@ -22,6 +22,7 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.noise_term import may_be_an_effect, unexplained
 from sdimu_calibration.core.note import Note, Topic, prefixed
@@ -355,7 +356,9 @@ def over_all_models(fit: SetFit, window: Posterior[SetEvidence]) -> SetFit:
         return fit
     columns = zip(window.told.members, board.columns(window.told.members), strict=True)
     told = tuple(member for member, column in columns if column < len(board.known))
-    if set(board.known) != set(fit.names) or len(told) < len(board.known) - len(board.evidence.weight):
+    # Weights of functions may be common in the window, and of single recordings in the fit.
+    same = {n for n in board.known if not is_weight(n)} == {n for n in fit.names if not is_weight(n)}
+    if not same or len(told) < len(board.known) - len(board.evidence.weight):
         return fit
     # Both in the linear model: that the scatter of power-ons is hardly known stays in the fit alone.
     noise = board.noise_of(fit, window.told.noise)
