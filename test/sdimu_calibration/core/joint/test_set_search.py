@@ -16,7 +16,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.joint.set_result import over_all_models
-from sdimu_calibration.core.joint.set_search import search_set
+from sdimu_calibration.core.joint.set_search import SetRequest, search_set
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.posterior import coefficients
 from sdimu_calibration.core.posterior.coefficients import Averages, drift_mean
@@ -75,7 +75,7 @@ def both(options):
     """What is found where all recordings have a ramp, and one has more of it."""
     some = unit_set(34, [short(stops=20)] * 3, ("gyro_bias_ramp_x=0.25 deg/h/h",))
     more = unit_set(34, [short(stops=20)] * 3, ("gyro_bias_ramp_x=1.2 deg/h/h",))
-    return search_set((*some.members[:2], more.members[2]), options, here)
+    return search_set((*some.members[:2], more.members[2]), SetRequest(options, here))
 
 
 def told_alone(found):

@@ -11,17 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sdimu_calibration.core.diagnosis.grades import NAMED
-from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.joint.function_fit import with_function, with_own_functions
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.set_board import SetBoard
-from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
+from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch, following
 from sdimu_calibration.core.joint.set_noise import SetNoise
-from sdimu_calibration.core.joint.set_search import search_beside, search_set, search_without
-from sdimu_calibration.core.progress import Progress, silent
+from sdimu_calibration.core.joint.set_search import SetRequest, search_beside, search_set, search_without
 
 
 @dataclass(frozen=True)
@@ -43,25 +41,18 @@ class Searched:
         return self.found.after.function is not None
 
 
-def searched(
-    members: Sequence[Member],
-    options: SetOptions,
-    run: Run,
-    extra: Sequence[Effect] = (),
-    progress: Progress = silent,
-    fitted: SetFit | None = None,
-) -> Searched:
+def searched(members: Sequence[Member], request: SetRequest, fitted: SetFit | None = None) -> Searched:
     """Search a set; parameters as for `search_set`."""
-    found = search_set(members, options, run, extra, progress, fitted=fitted)
+    found = search_set(members, request, fitted)
     beside = found if found.after.function is not None else None
     if beside is not None and not beside.function_is_likely:
-        found = search_without(beside, options, run, extra, progress)
-    again = recurrence(leftovers(found.alone, run))
+        found = search_without(beside, request)
+    again = recurrence(leftovers(found.alone, request.run))
     if beside is None and again is not None:
         # Some recording may have an error that follows the attitude, or what is left may come back with it.
         returns = again.sensors if again.may_come_back(ATTITUDE) else ()
-        fit = with_function(found.after, following(found.posterior, NAMED) or returns, run)
-        beside = search_beside(found, fit, options, run, extra, progress) if fit.function else None
+        fit = with_function(found.after, following(found.posterior, NAMED) or returns, request.run)
+        beside = search_beside(found, fit, request) if fit.function else None
     if beside is None:
         return Searched(found, None, again, ())
     functions = beside.functions if beside.stood else ()

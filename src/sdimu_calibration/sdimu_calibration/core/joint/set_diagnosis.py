@@ -29,7 +29,7 @@ from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, 
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import place_of, place_of_local
+from sdimu_calibration.core.joint.set_search import SetRequest, place_of, place_of_local
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
 from sdimu_calibration.core.noise_term import unexplained
 from sdimu_calibration.core.plain_text import capital, first_of, listing
@@ -96,10 +96,10 @@ def diagnose_set(
     progress: Progress = silent,
     fitted: SetFit | None = None,
 ) -> SetDiagnosis:
-    """Find what the model of a set misses; parameters as for `search_set`."""
+    """Find what the model of a set misses; parameters as for `SetRequest` and `search_set`."""
     if len(members) < 2:
         raise DataError(f"a set of one recording: diagnose it by itself ({Work.DIAGNOSE} BAG)")
-    done = searched(members, options, run, extra, progress, fitted)
+    done = searched(members, SetRequest(options, run, tuple(extra), progress), fitted)
     progress("report", 0.95)
     found, again, without = done.found, done.again, done.without
     before, facts = set_outcome(found.before), _facts(found, again)

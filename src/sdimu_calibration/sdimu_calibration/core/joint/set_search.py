@@ -8,7 +8,7 @@ again in the next round, about the fit that has it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -47,48 +47,43 @@ _DOUBLE = 0.995
 length."""
 
 
-def search_set(
-    members: Sequence[Member],
-    options: SetOptions,
-    run: Run,
-    extra: Sequence[Effect] = (),
-    progress: Progress = silent,
-    fitted: SetFit | None = None,
-) -> SetSearch:
+@dataclass(frozen=True)
+class SetRequest:
+    """What is searched for in a set, and by what means."""
+
+    options: SetOptions
+    run: Run
+    """Does the jobs."""
+    extra: tuple[Effect, ...] = ()
+    """The user's own effects, tried with the catalogue."""
+    progress: Progress = silent
+
+    def fit(self, told: Sequence[Candidate], before: SetFit) -> SetFit:
+        """Fit the members of an earlier fit with what is told."""
+        return fit_set(before.members, _with(self.options, told), self.run, before, self.progress)
+
+
+def search_set(members: Sequence[Member], request: SetRequest, fitted: SetFit | None = None) -> SetSearch:
     """Find what the model of a set misses.
 
     Parameters
     ----------
     members : sequence of Member
         At least two.
-    run : callable
-        Does the jobs.
-    extra : sequence of Effect
-        The user's own effects, tried with the catalogue.
     fitted : SetFit, optional
         The set with the model as given, where it was fitted already.
     """
-    before = fitted or fit_set(members, options, run, progress=progress)
-    return _searched(before, before, (), options, run, extra, progress)
+    before = fitted or fit_set(members, request.options, request.run, progress=request.progress)
+    return _searched(before, before, (), request)
 
 
-def search_without(
-    found: SetSearch, options: SetOptions, run: Run, extra: Sequence[Effect] = (), progress: Progress = silent
-) -> SetSearch:
+def search_without(found: SetSearch, request: SetRequest) -> SetSearch:
     """Search again without the function that a search asked for; what was found is a candidate again."""
-    alone = fit_set(found.before.members, _with(options, found.told), run, found.before, progress)
-    again = _searched(found.before, alone, found.told, options, run, extra, progress, asks=False)
+    again = _searched(found.before, request.fit(found.told, found.before), found.told, request, asks=False)
     return replace(again, first=found.first, threshold=found.threshold)
 
 
-def search_beside(
-    found: SetSearch,
-    fit: SetFit,
-    options: SetOptions,
-    run: Run,
-    extra: Sequence[Effect] = (),
-    progress: Progress = silent,
-) -> SetSearch:
+def search_beside(found: SetSearch, fit: SetFit, request: SetRequest) -> SetSearch:
     """Search again where a fit has a function that all recordings share; what was found is a candidate again.
 
     Parameters
@@ -96,19 +91,12 @@ def search_beside(
     fit : SetFit
         With the function and with what was found.
     """
-    again = _searched(found.before, fit, found.told, options, run, extra, progress)
+    again = _searched(found.before, fit, found.told, request)
     return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
 
 
 def _searched(
-    before: SetFit,
-    fit: SetFit,
-    told: tuple[Candidate, ...],
-    options: SetOptions,
-    run: Run,
-    extra: Sequence[Effect],
-    progress: Progress,
-    asks: bool = True,
+    before: SetFit, fit: SetFit, told: tuple[Candidate, ...], request: SetRequest, asks: bool = True
 ) -> SetSearch:
     """Search about a fit with what is told, until the choice stands.
 
@@ -118,21 +106,21 @@ def _searched(
         Put a function of the attitude beside the fit as soon as some recording is likely to have one: effects that are
         chosen without it would be parts of it, one after the other.
     """
-    members, alone = before.members, None
+    alone: SetFit | None = None
     finer: tuple[Effect, ...] = ()
     seen: set[frozenset[str]] = {frozenset(c.label for c in told)}
     found: Search[SetEvidence] | None = None
     first: Search[SetEvidence] | None = None
     stood = False
     for turn in range(_MOST_ROUNDS):
-        progress("candidates", min(0.9, 0.4 + 0.1 * turn))
-        full, evidence = _evidence(fit, extra, finer, run)
+        request.progress("candidates", min(0.9, 0.4 + 0.1 * turn))
+        full, evidence = _evidence(fit, request, finer)
         columns, tried = _reopened(evidence, told)
         again = evidence.as_candidates(columns, tried)
         names = {c.label: evidence.names[column] for c, column in zip(tried, columns.tolist(), strict=True)}
         boards, limit = partial(SetBoard, full, names), first.threshold if first else None
         found = search(again, _singles(again), None, FALSE_ALARM, limit, found, tell_noise=False, make=boards)
-        beside = _beside_function(fit, found, run) if asks else fit
+        beside = _beside_function(fit, found, request.run) if asks else fit
         if beside is not fit:
             first, found, alone, fit = first or with_steps(found), None, alone or fit, beside
             continue
@@ -149,7 +137,7 @@ def _searched(
             break
         seen.add(labels)
         told = chosen
-        fit = in_size(fit_set(members, _with(options, told), run, fit, progress))
+        fit = in_size(request.fit(told, fit))
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
     result = _result(before, fit, told, evidence, (first, found), stood)
@@ -225,7 +213,7 @@ def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:
     return replace(options, model=model, local=local, scopes={**scopes, **options.scopes})
 
 
-def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run: Run) -> tuple[SetFit, SetEvidence]:
+def _evidence(fit: SetFit, request: SetRequest, finer: Sequence[Effect]) -> tuple[SetFit, SetEvidence]:
     """Take the evidence about a fit, with all that its model may lack in all recordings or in one.
 
     Returns
@@ -234,8 +222,8 @@ def _evidence(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect], run
         Its reports have the signatures of the candidates, and what each recording says in each noise.
     evidence : SetEvidence
     """
-    effects = _candidates(fit, extra, finer)
-    full = _gathered(fit, effects, run)
+    effects = _candidates(fit, request.extra, finer)
+    full = _gathered(fit, effects, request.run)
     every = [label for report in full.reports for label in report.reduction.labels]
     local = [of_one_recording(label) for label in every if split_tag(label)[1]]
     reports, labels = with_changes(full.reports, stable_effects(full.model, full.varying))
