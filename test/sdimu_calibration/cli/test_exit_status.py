@@ -230,7 +230,7 @@ def once(search):
 def test_diagnose_ends_as_its_verdict_says(sdimu, bags, monkeypatch, number):
     # The search comes before the verdict, and is most of the work.
     monkeypatch.setattr(of_one, "searched", once(of_one.searched))
-    monkeypatch.setattr(of_set, "search_set", once(of_set.search_set))
+    monkeypatch.setattr(of_set, "searched", once(of_set.searched))
     for word in ("unexplained", "one effect"):
         monkeypatch.setattr(of_one, "verdict", lambda *_, said=word: said)
         monkeypatch.setattr(of_set, "verdict_of_set", lambda *_, said=word: said)

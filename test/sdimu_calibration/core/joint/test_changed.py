@@ -115,5 +115,6 @@ def test_an_effect_of_one_recording_is_told_of_none_of_the_others(options):
     assert found.sentence.startswith("Something differs between the recordings")
     assert "An error that follows the attitude is in r1 (accel_y" in found.sentence
     assert "come back" not in found.sentence
-    assert found.advice[0].kind == Kind.LOOK_AT_MOUNT
+    assert [one.kind for one in found.advice] == [Kind.LOOK_AT_RECORDING]
+    assert found.advice[0].arguments[0] == "r1"
     assert not found.unknown

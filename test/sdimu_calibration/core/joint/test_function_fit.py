@@ -94,11 +94,15 @@ def test_a_diagnosis_tells_nothing_that_imitates_it_where_two_plans_share_few_at
     )
     z = z_of_result(found.after, wave)
     assert np.sqrt(np.mean(z**2)) < 1.3
-    # What a plan for the next recording begins with knows no more than the result.
+    check_standing(found, "gyro_scale")
+
+
+def check_standing(found, begin):
+    """What a plan for the next recording begins with knows no more than the result of coefficients with this begin."""
     known = found.standing.known
     place = {name: k for k, name in enumerate(known.names)}
     alone = np.linalg.inv(known.J + np.diag(1.0 / known.prior**2))
-    of_unit = [k for k, name in enumerate(found.after.names) if name.startswith("gyro_scale")]
+    of_unit = [k for k, name in enumerate(found.after.names) if name.startswith(begin)]
     told = np.sqrt(np.diag(found.after.covariance))[of_unit]
     again = np.sqrt(np.diag(alone))[[place[found.after.names[k]] for k in of_unit]]
     np.testing.assert_allclose(again, told, rtol=0.05)
@@ -137,3 +141,4 @@ def test_recordings_with_functions_of_their_own_share_none(options):
     # share it had a sigma of 139 ppm.
     place = found.after.names.index("accel_scale_x")
     assert np.sqrt(found.after.covariance[place, place]) < 40e-6
+    check_standing(found, "accel_scale_x")

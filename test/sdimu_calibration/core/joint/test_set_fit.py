@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sdimu_calibration.core.estimation.solve import with_effects
+from sdimu_calibration.core.joint import set_fit
 from sdimu_calibration.core.joint.member import Member, fitted, run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
@@ -174,6 +175,20 @@ def test_what_a_strong_effect_leaves_at_an_earlier_point_is_no_noise_beside_it(o
     for name, true in hidden.items():
         place = fit.names.index(name)
         assert fit.estimate.values[place] == pytest.approx(true, abs=4.0 * fit.estimate.covariance[place, place] ** 0.5)
+
+
+def test_each_recording_learns_its_noise_whichever_moved_last(options, monkeypatch):
+    some = unit_set(37, [short(stops=8)] * 2, ("accel_quadratic_y=80 ug/g^2",))
+    before = fit_set(some.members, options, here)
+    asked = []
+
+    def run(jobs):
+        asked.append({job.member.name: job.noise for job in jobs})
+        return here(jobs)
+
+    monkeypatch.setattr(set_fit, "_moved", lambda _, name: name == "r1" and len(asked) < 2)
+    fit_set(some.members, replace(options, model=with_effects(options.model, ["accel_quadratic_y"])), run, before)
+    assert asked == [{"r0": (), "r1": ()}, {"r1": ()}, {"r0": None, "r1": None}]
 
 
 def test_a_prior_that_holds_all_recordings_back_is_no_scatter():

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sdimu_calibration.core.diagnosis.grades import NAMED
-from sdimu_calibration.core.joint.function_fit import with_function, with_own_functions
+from sdimu_calibration.core.joint.function_fit import with_function
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
-from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch, following
-from sdimu_calibration.core.joint.set_noise import SetNoise
 from sdimu_calibration.core.joint.set_search import SetRequest, search_beside, search_set, search_without
 
 
@@ -59,18 +57,7 @@ def searched(members: Sequence[Member], request: SetRequest, fitted: SetFit | No
     again = None if again is None else _judged(again, beside)
     if not beside.function_is_likely:
         return Searched(found, None, again, functions)
-    return Searched(_in_its_functions(beside), None if beside is found else found, again, functions)
-
-
-def _in_its_functions(found: SetSearch) -> SetSearch:
-    """Let the fit stand in the functions that are told: with none in common, in those of single recordings alone."""
-    board, noise = found.posterior.board, found.posterior.told.noise
-    if not (found.stood and isinstance(board, SetBoard) and isinstance(noise, SetNoise)):
-        return found
-    if any(noise.function) or not any(map(any, noise.own_functions)):
-        return found
-    own = [board.functions.own(sizes) for sizes in noise.own_functions]
-    return replace(found, after=with_own_functions(found.after, own))
+    return Searched(beside, None if beside is found else found, again, functions)
 
 
 def _judged(again: Recurrence, beside: SetSearch) -> Recurrence:

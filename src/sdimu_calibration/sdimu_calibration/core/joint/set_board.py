@@ -17,11 +17,9 @@ from sdimu_calibration.core.evidence.taken import nothing_taken
 from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior, OwnWeights
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
-from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
 from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
 from sdimu_calibration.core.joint.set_noise import Layout, SetNoise
-from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board, InNoise
@@ -291,7 +289,8 @@ class SetBoard(Board[SetEvidence]):
         Parameters
         ----------
         likeliest : NoiseModel
-            Where a recording has learned terms that are not among its noises here, its noise in this one.
+            Where a recording has learned terms that are not among its noises here, its noise in this one; functions of
+            single recordings, where the fit has some.
         """
         chosen = list(self._chosen(likeliest))
         for k, report in enumerate(fit.reports):
@@ -299,7 +298,7 @@ class SetBoard(Board[SetEvidence]):
             every = [{t.identity: np.log(t.size) for t in one.noise.terms} for one in self.rivals[k]]
             same = [j for j, one in enumerate(every) if one.keys() == wanted.keys()]
             chosen[k] = min(same, key=lambda j: sum(abs(every[j][i] - wanted[i]) for i in wanted), default=chosen[k])
-        if any(is_weight(name) and split_tag(name)[1] for name in fit.names):
+        if fit.has_own_functions:
             alone = self._layout.own(self._chosen(likeliest))
             return self._noise(self._layout.choice(chosen[: len(self.rivals)], self._layout.common(self._white), alone))
         if fit.function is not None:

@@ -110,7 +110,7 @@ def diagnose_set(
     why = why if found.stood else (*why, f"{capital(TO_AND_FRO)}.")
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
-    steps = [Advice(Kind.LOOK_AT_MOUNT)] if facts.is_of_each else next_steps(again, facts.beside_function)
+    steps = _look_at(facts.functions) if facts.is_of_each else next_steps(again, facts.beside_function)
     kept = [] if word == Verdict.UNEXPLAINED else _added(found, facts.findings)
     return SetDiagnosis(
         word,
@@ -250,6 +250,13 @@ def _of_recordings(findings: Sequence[SetFinding]) -> dict[tuple[str, str], str]
     return {place: first_of(labels, LISTED) for place, labels in found.items()}
 
 
+def _look_at(functions: Sequence[FunctionShare]) -> list[Advice]:
+    """Advise where to look for the cause of functions of single recordings."""
+    if len(functions) > 1:
+        return [Advice(Kind.LOOK_AT_MOUNT)]
+    return [Advice(Kind.LOOK_AT_RECORDING, (functions[0].recording, "an error that follows the attitude"))]
+
+
 def _advice(
     word: Verdict, findings: Sequence[SetFinding], closing: Closing, steps: Sequence[Advice]
 ) -> tuple[Advice, ...]:
@@ -268,6 +275,6 @@ def _advice(
     out += closing_advice(closing)
     if word == Verdict.CLASS_OF_EFFECTS and not findings:
         out.append(Advice(Kind.RECORD_MORE))
-    if word == Verdict.UNEXPLAINED:
+    if word == Verdict.UNEXPLAINED and not any(one.kind == Kind.LOOK_AT_RECORDING for one in steps):
         out.append(Advice(Kind.ONE_BY_ONE))
     return tuple(out)

@@ -21,7 +21,7 @@ from sdimu_calibration.core.joint.combine import Combination, Component, JointEs
 from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
 from sdimu_calibration.core.joint.member import Job, Member, Report, fitted
 from sdimu_calibration.core.joint.same_unit import check_one_unit
-from sdimu_calibration.core.joint.scope import by_name, split_tag, tagged
+from sdimu_calibration.core.joint.scope import by_name, split_tag, tagged, varying_effects
 from sdimu_calibration.core.joint.set_order import (
     check_different,
     check_members,
@@ -45,8 +45,6 @@ is linearised again, where squares of errors do not count: the rows then change 
 _NEAR = 2.0
 """The same where squares count, or a recording does not know its heading (sigmas of the joint estimate): what is left
 of the squares is then below the sigma."""
-SCOPES = ("unit", "power-on")
-"""Scopes that a set can give an effect of its model."""
 _MOST_ROUNDS = 6
 """Number of linearisations at most: where recordings know their heading the second already moves the estimate by less
 than a sigma."""
@@ -120,6 +118,11 @@ class SetFit:
         report = max(reversed(self.reports), key=lambda r: len(r.times.stops))
         return fitted(job_of(by_name[report.name], SetOptions(self.model), self))
 
+    @property
+    def has_own_functions(self) -> bool:
+        """Whether recordings have functions of the attitude of their own in it."""
+        return any(is_weight(name) and split_tag(name)[1] for name in self.names)
+
     def values_of(self, report: Report) -> dict[str, float]:
         """Coefficients (SI) of the estimator in one recording, deviations of its power-on included, by name."""
         values = dict(zip(self.names, self.estimate.values.tolist(), strict=True))
@@ -170,6 +173,7 @@ def fit_set(
     options = replace(options, model=with_effects(bare, [by_name(e) for e in options.model.effects]))
     progress("recordings", 0.1)
     jobs = [_first_job(member, options, before) for member in members]
+    in_white = {job.member.name for job in jobs if job.noise == ()}
     done = run(jobs)
     left = {job.member.name: _why(job.member, d) for job, d in zip(jobs, done, strict=True) if isinstance(d, DataError)}
     earlier = {r.name: r for r in (before.reports if before else ())}
@@ -211,7 +215,7 @@ def fit_set(
         why = "; ".join(f"{name} is left out: {text}" for name, text in left.items())
         raise DataError(f"only one of {len(members)} recordings can be used: mend or omit the others ({why})")
     fit = _in_shared_scatter(fit, options, run)
-    waiting = {*late, *(job.member.name for job in jobs if job.noise == ())} - {*left}
+    waiting = {*late, *in_white} - {*left}
     fit = _noise_of(waiting, fit, options, run) if waiting else fit
     return replace(fit, left_out=tuple(left.items()), unit_doubt=doubt)
 
@@ -220,7 +224,8 @@ def _first_job(member: Member, options: SetOptions, before: SetFit | None) -> Jo
     """Make the job of a recording with which a fit begins: in white noise until the point stands."""
     # About a point that lacks what is new in the model noise takes up what that leaves, and the point stays.
     job = job_of(member, options, before)
-    return job if job.about is None else replace(job, noise=())
+    by_hand = job.about is None or job.estimator == HandheldFit.estimator
+    return job if by_hand else replace(job, noise=())
 
 
 def _noise_of(names: Collection[str], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
@@ -357,31 +362,6 @@ def joint_names(reports: Sequence[Report]) -> tuple[str, ...]:
     names = [n for n in every if not is_weight(n)]
     shared = [n for n in names if not split_tag(n)[1]]
     return (*shared, *(n for n in names if split_tag(n)[1]), *(n for n in every if is_weight(n)))
-
-
-def varying_effects(model: Model, scopes: Mapping[str, str], names: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Effects of the model that differ from power-on to power-on, with their coefficients.
-
-    Parameters
-    ----------
-    scopes : mapping of str to str
-        Scopes by name of effect, in place of those of their traits.
-    names : sequence of str
-        Coefficients that the estimator has.
-    """
-    effects = {e.family or e.name: e for e in map(resolve, model.effects)}
-    for name, scope in scopes.items():
-        if name not in effects or scope not in SCOPES:
-            raise DataError(
-                f"scope of '{name}': '{scope}': expected one of {', '.join(SCOPES)}, and an effect of the model "
-                f"({', '.join(effects)})"
-            )
-    varying = {
-        name: tuple(p.name for p in effect.parameters if p.name in names)
-        for name, effect in effects.items()
-        if scopes.get(name, effect.scope) == "power-on"
-    }
-    return {name: own for name, own in varying.items() if own}
 
 
 def grouped_rows(reports: Sequence[Report], names: Sequence[str]) -> list[Rows]:

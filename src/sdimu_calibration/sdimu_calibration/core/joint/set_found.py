@@ -171,6 +171,16 @@ def following(window: Posterior[SetEvidence], least: float) -> tuple[str, ...]:
     return tuple(c for c in CHANNELS if window.of_any_noise(partial(holds, c)) > least)
 
 
+def likeliest_alone(window: Posterior[SetEvidence]) -> SetNoise | None:
+    """Find the likeliest noise in which recordings have functions of the attitude of their own, and none is common."""
+    alone = [
+        (p, noise)
+        for noise, p in window.noises
+        if isinstance(noise, SetNoise) and any(map(any, noise.own_functions)) and not any(noise.function)
+    ]
+    return max(alone, key=lambda one: one[0])[1] if alone else None
+
+
 def of_one_recording(label: str) -> Candidate:
     """Make the candidate of one recording, by its label."""
     key, recording = split_tag(label)

@@ -22,6 +22,7 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, held_out
 from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.joint.set_found import likeliest_alone
 from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.joint.variation import Variation, variation
 from sdimu_calibration.core.noise_term import may_be_an_effect, unexplained
@@ -361,7 +362,8 @@ def over_all_models(fit: SetFit, window: Posterior[SetEvidence]) -> SetFit:
     if not same or len(told) < len(board.known) - len(board.evidence.weight):
         return fit
     # Both in the linear model: that the scatter of power-ons is hardly known stays in the fit alone.
-    noise = board.noise_of(fit, window.told.noise)
+    likeliest = likeliest_alone(window) if fit.has_own_functions else None
+    noise = board.noise_of(fit, likeliest or window.told.noise)
     means = fit.base.dwell_means
     one = Averages(board.as_stated, means).of_model(told, noise)
     all_ = Averages(board, means).of(window)

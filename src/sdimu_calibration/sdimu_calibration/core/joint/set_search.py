@@ -22,13 +22,13 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
-from sdimu_calibration.core.joint.function_fit import in_size, with_function
+from sdimu_calibration.core.joint.function_fit import in_size, with_function, with_own_functions
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
-from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, following, of_one_recording
+from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, following, likeliest_alone, of_one_recording
 from sdimu_calibration.core.joint.set_standing import set_standing
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
@@ -60,7 +60,8 @@ class SetRequest:
 
     def fit(self, told: Sequence[Candidate], before: SetFit) -> SetFit:
         """Fit the members of an earlier fit with what is told."""
-        return fit_set(before.members, _with(self.options, told), self.run, before, self.progress)
+        fit = fit_set(before.members, _with(self.options, told), self.run, before, self.progress)
+        return replace(fit, left_out=(*before.left_out, *fit.left_out))
 
 
 def search_set(members: Sequence[Member], request: SetRequest, fitted: SetFit | None = None) -> SetSearch:
@@ -120,7 +121,7 @@ def _searched(
         names = {c.label: evidence.names[column] for c, column in zip(tried, columns.tolist(), strict=True)}
         boards, limit = partial(SetBoard, full, names), first.threshold if first else None
         found = search(again, _singles(again), None, FALSE_ALARM, limit, found, tell_noise=False, make=boards)
-        beside = _beside_function(fit, found, request.run) if asks else fit
+        beside = _beside_function(fit, found, request.run) if asks and turn + 1 < _MOST_ROUNDS else fit
         if beside is not fit:
             first, found, alone, fit = first or with_steps(found), None, alone or fit, beside
             continue
@@ -140,7 +141,7 @@ def _searched(
         fit = in_size(request.fit(told, fit))
     if first is None or found is None:
         raise AssertionError("a search has one round at least")
-    result = _result(before, fit, told, evidence, (first, found), stood)
+    result = _in_own_functions(_result(before, fit, told, evidence, (first, found), stood), full, evidence)
     return result if alone is None else replace(result, alone=alone)
 
 
@@ -197,6 +198,24 @@ def _result(
         return result
     common = tuple(s for one in result.told_functions if one.is_common for s in one.sensors)
     return replace(result, after=replace(fit, function=replace(function, told=common)))
+
+
+def _in_own_functions(found: SetSearch, full: SetFit, evidence: SetEvidence) -> SetSearch:
+    """Let the fit, and what the set knows of the unit, stand in functions of single recordings where none is common.
+
+    Parameters
+    ----------
+    full : SetFit
+        Its reports have the signatures of the candidates of the evidence.
+    """
+    board, noise, functions = found.posterior.board, likeliest_alone(found.posterior), found.told_functions
+    common = not functions or any(one.is_common for one in functions)
+    if common or not found.stood or noise is None or not isinstance(board, SetBoard):
+        return found
+    own = [board.functions.own(sizes) for sizes in noise.own_functions]
+    fit, shared = with_own_functions(found.after, own), {c.label: c for c in found.chosen}
+    about = set_evidence(with_own_functions(full, own), evidence.candidates) if shared else set_evidence(fit, ())
+    return replace(found, after=fit, standing=set_standing(fit, about, shared, found.alike))
 
 
 def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:

@@ -145,8 +145,7 @@ def _found(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
         return (_of_recordings(findings), *_of_each(facts))
     every = each_grade(list(map(_graded, findings))) if findings else ()
     if word == Verdict.UNEXPLAINED:
-        # The fit of which coefficients scatter has the functions of single recordings in none of them.
-        odd = () if facts.functions else _odd(facts.after)
+        odd = () if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
         what = "The recordings share something" if shared else "Something differs between the recordings"
         beside = ("Found beside it:", *every) if every else ()
