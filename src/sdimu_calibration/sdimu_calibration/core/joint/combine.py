@@ -187,16 +187,28 @@ class Combination:
         ``I + R D^2 R'``, lose to rounding what few power-ons know where D is large.
         """
         R = self.A[:, :, self.varying] * self.sizes(tau)
+        constant, U, first, rest = self._without(R, self.A)
+        A, y = rest[:, :, :-1].reshape(-1, len(self.unit)), rest[:, :, -1].ravel()
+        return constant, Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y), U, first
+
+    def _without(self, R: Floats, others: Floats) -> tuple[float, Floats, Floats, Floats]:
+        """Integrate deviations of sigma one that rows see by R, shape (G, k, v), beside columns that stay.
+
+        Returns
+        -------
+        constant : float
+            What the log-likelihood has beside that of the rows that are left (1).
+        U, first, rest : ndarray
+            As of `_reduced`: factor and rows of the deviations, then rows without them, the data last in each.
+        """
         v = R.shape[2]
-        rows = np.concatenate([R, self.A, self.y[:, :, None]], axis=2)
-        prior = np.zeros_like(rows)
+        rows = np.concatenate([R, others, self.y[:, :, None]], axis=2)
+        prior = np.zeros((len(rows), v, rows.shape[2]))
         prior[:, range(v), range(v)] = 1.0
         T = np.asarray(np.linalg.qr(np.concatenate([rows, prior], axis=1), mode="r"))
         U, first, rest = T[:, :v, :v], T[:, :v, v:], T[:, v:, v:]
-        A, y = rest[:, :, :-1].reshape(-1, len(self.unit)), rest[:, :, -1].ravel()
         determinant = np.log(np.abs(np.diagonal(U, axis1=1, axis2=2))).sum()
-        constant = 0.5 * float(np.sum(first[:, :, -1] ** 2)) - float(determinant)
-        return constant, Information(self.J_rest + A.T @ A, self.d_rest + A.T @ y), U, first
+        return 0.5 * float(np.sum(first[:, :, -1] ** 2)) - float(determinant), U, first, rest
 
     def along(self, component: int, tau: Floats) -> Line:
         """Integrate the deviations of all components but one, whose sigma may then be anything.
@@ -210,20 +222,15 @@ class Combination:
         """
         counts = [len(c.columns) for c in self.components]
         own = np.repeat(np.arange(len(counts)) == component, counts)
-        R = self.A[:, :, self.varying] * np.where(own, 1.0 / self.unit[self.varying], self.sizes(tau))
-        others = int(np.count_nonzero(~own))
-        rows = np.concatenate([R[:, :, ~own], R[:, :, own], self.A, self.y[:, :, None]], axis=2)
-        prior = np.zeros((len(rows), others, rows.shape[2]))
-        prior[:, range(others), range(others)] = 1.0
-        T = np.asarray(np.linalg.qr(np.concatenate([rows, prior], axis=1), mode="r"))
-        determinant = np.log(np.abs(np.diagonal(T[:, :others, :others], axis1=1, axis2=2))).sum()
-        rest, v = T[:, others:, others:], int(np.count_nonzero(own))
+        R, v = self.A[:, :, self.varying], int(np.count_nonzero(own))
+        one = R[:, :, own] / self.unit[self.varying][own]
+        constant, _, _, rest = self._without((R * self.sizes(tau))[:, :, ~own], np.concatenate([one, self.A], axis=2))
         # Turned so that each row sees one combination of the deviations of its power-on, or none.
         turn, seen, _ = np.linalg.svd(rest[:, :, :v])
         turned = np.swapaxes(turn, 1, 2) @ rest[:, :, v:]
         square = np.zeros(turned.shape[:2])
         square[:, : seen.shape[1]] = seen**2
-        constant = 0.5 * float(np.sum(T[:, :others, -1] ** 2) + np.sum(turned[:, :, -1] ** 2)) - float(determinant)
+        constant += 0.5 * float(np.sum(turned[:, :, -1] ** 2))
         A, y = turned[:, :, :-1].reshape(-1, len(self.unit)), turned[:, :, -1].ravel()
         return Line(constant, A, y, square.ravel(), Information(self.J_rest, self.d_rest), self.weight)
 

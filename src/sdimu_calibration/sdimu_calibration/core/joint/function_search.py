@@ -1,8 +1,7 @@
 """Search a set with and without an unknown function of the attitude, and say what comes back of what is left.
 
-The search asks for a function itself where one is likely before anything was chosen. Here it is also asked for where it
-is only possible at the end, or where what is left may come back with the attitude; and it is left out where it turns
-out not to be likely.
+The search itself asks for a function as soon as one is likely. At its end one is asked for here where it is possible,
+or where what is left may come back with the attitude. One that turns out not to be likely is left out again.
 """
 
 from __future__ import annotations

@@ -224,8 +224,8 @@ def _first_job(member: Member, options: SetOptions, before: SetFit | None) -> Jo
     """Make the job of a recording with which a fit begins: in white noise until the point stands."""
     # About a point that lacks what is new in the model noise takes up what that leaves, and the point stays.
     job = job_of(member, options, before)
-    by_hand = job.about is None or job.estimator == HandheldFit.estimator
-    return job if by_hand else replace(job, noise=())
+    by_itself = job.about is None or job.estimator == HandheldFit.estimator
+    return job if by_itself else replace(job, noise=())
 
 
 def _noise_of(names: Collection[str], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
