@@ -280,6 +280,10 @@ def picture(results: Results) -> str:
             ends = f'x1="{x:.1f}" y1="{bottom:.1f}" x2="{x:.1f}" y2="{top:.1f}"'
             marks.append(f'<line {ends} stroke="{colour}" opacity=".35"/>')
             marks.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{colour}"><title>{what}: {n}</title></circle>')
+    for share in (0.0, 0.5, 1.0):
+        x, y = at(share, share)
+        marks.append(f'<text x="{x:.1f}" y="{size - edge + 14:.1f}" text-anchor="middle">{share:g}</text>')
+        marks.append(f'<text x="{edge - 5:.1f}" y="{y + 4:.1f}" text-anchor="end">{share:g}</text>')
     (x0, y0), (x1, y1) = at(0.0, 0.0), at(1.0, 1.0)
     legend = "".join(
         f'<text x="{edge + 8}" y="{edge + 14 + 14 * k}" fill="{colour}">{what}</text>'

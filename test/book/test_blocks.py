@@ -39,7 +39,7 @@ def test_a_tutorial_runs_as_it_stands(page, tmp_path, recorded, request):
     run(blocks, tmp_path, Processes() if page.stem in STARTED else request.getfixturevalue("fork"))
 
 
-def test_the_commands_of_the_readme_run_as_they_stand(tmp_path, batch, fork):
+def test_the_commands_of_the_readme_run(tmp_path, batch, fork):
     lines = commands(ROOT / "README.md")
     assert len(lines) > 10
     # What is the reader's own: a recording, its place and data sheet, results of many units.
