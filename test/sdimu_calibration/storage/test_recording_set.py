@@ -9,14 +9,16 @@ import subprocess
 import sys
 import time
 import zipfile
+from concurrent.futures import Executor, Future
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sdimu_calibration.core.evidence.attitude_functions import AttitudeFunctions
-from sdimu_calibration.core.joint.member import run
+from sdimu_calibration.core.joint.member import fitted, run
 from sdimu_calibration.core.joint.set_fit import SetOptions, fit_set, job_of
 from sdimu_calibration.core.joint.set_result import set_outcome
 from sdimu_calibration.core.joint.shared_function import SharedFunction
@@ -26,8 +28,8 @@ from sdimu_calibration.storage.files.config import load_imu, load_plan, load_sit
 from sdimu_calibration.storage.files.model_choice import named_model
 from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_calibration.storage.kept_report import LONGEST, read_report, write_report
-from sdimu_calibration.storage.recording_set import BagSource, bags_below, load_set, set_of, write_set
-from sdimu_calibration.storage.set_work import bag_checksum, job_number, set_runner
+from sdimu_calibration.storage.recording_set import BagSource, KeptOpen, bags_below, load_set, set_of, write_set
+from sdimu_calibration.storage.set_work import Pool, bag_checksum, job_number, set_runner
 from sdimu_sim.bag_file import write_test
 from sdimu_sim.core.scenario import Scenario, simulate_test
 
@@ -250,6 +252,59 @@ def test_processes_give_the_same_digits(bags):
     with set_runner(4, 1, None) as work:
         here = fit_set(members, OPTIONS, work)
     np.testing.assert_array_equal(pool.estimate.values, here.estimate.values)
+
+
+def test_each_process_has_recordings_of_its_own(bags):
+    """It keeps them open, and another one would open them again."""
+    asked: list[list[str]] = [[], []]
+
+    class Process(Executor):
+        def __init__(self, log):
+            self.log = log
+
+        def submit(self, work, job):
+            self.log.append(job.member.name)
+            done = Future()
+            done.set_result(f"{work.__name__} {job.member.name}")
+            return done
+
+    options = replace(OPTIONS, model=replace(OPTIONS.model, effects=("gyro_bias", "accel_bias")))
+    jobs = [job_of(m, options, None) for m in set_of([bags / "run1", bags / "run2"], LIKE).members]
+    jobs.append(replace(jobs[0], member=replace(jobs[0].member, name="run3")))
+    pool = Pool(list(map(Process, asked)), None)
+    assert pool.do(jobs) == ["tried run1", "tried run2", "tried run3"]
+    pool.do(jobs[::-1])
+    assert asked == [["run1", "run3", "run3", "run1"], ["run2", "run2"]]
+
+
+def test_recordings_stay_open_while_memory_holds_them():
+    opened: list[str] = []
+
+    class Source:
+        def __init__(self, name, samples):
+            self.name, self.samples = name, samples
+
+        def opened(self):
+            opened.append(self.name)
+            return SimpleNamespace(recording=SimpleNamespace(t=np.zeros(self.samples)))
+
+    kept = KeptOpen(10)
+    one, other, long = Source("one", 4), Source("other", 6), Source("long", 30)
+    for source in (one, other, one, other, long, long, one, one):
+        kept.of(source, ())
+    # A long one alone stays, and takes the place of all others.
+    assert opened == ["one", "other", "long", "one"]
+    kept.of(one, ("changed",))
+    assert opened[-2:] == ["one", "one"]
+
+
+def test_a_recording_is_fitted_once_for_questions_about_one_fit(bags):
+    job = job_of(set_of([bags / "run1"], LIKE).members[0], OPTIONS, None)
+    fit = fitted(job)
+    assert fitted(replace(job, candidates=("gyro_bias_ramp",), with_local=True, rivals=True, stretches=True)) is fit
+    assert fitted(replace(job, local=("gyro_bias_ramp_x",))) is not fit
+    about = replace(job, about=dict.fromkeys(fit.names, 0.0))
+    assert fitted(about) is not fitted(replace(about, about=dict.fromkeys(fit.names, 1e-9)))
 
 
 def test_a_result_of_a_set_is_read_back(bags, tmp_path):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -29,8 +29,9 @@ from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
 
 _FILES = frozenset({".mcap", ".db3", ".bag"})
 """Endings of files that are bags by themselves."""
-_KEPT_OPEN = 2
-"""Number of recordings that a process keeps in memory: linearising again follows soon in small sets."""
+_KEPT_SAMPLES = 1_200_000
+"""Number of samples (1) of all recordings that a process keeps in memory: half a gigabyte with their fits, and six
+recordings of fifty minutes at 100 Hz in two processes. A set asks the same recordings three times and more."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +52,34 @@ class BagSource:
         """Open the bag."""
         stated = (("imu", self.imu), ("site", self.site))
         files = (self.bag, *(find_config(kind, name) for kind, name in stated if name is not None))
-        return _opened(self, tuple(state for file in files for state in file_states(file)))
+        return _OPEN.of(self, tuple(state for file in files for state in file_states(file)))
+
+    def opened(self) -> PreparedTest:
+        """Open the bag anew."""
+        imu = None if self.imu is None else load_imu(self.imu)
+        test = open_test(self.bag, self.site, imu, self.source, self.handheld, self.measured_noise)
+        return with_imu_file(test, self.imu).counted_from(self.reference_degc)
 
 
-@lru_cache(maxsize=_KEPT_OPEN)
-def _opened(of: BagSource, _: tuple[FileState, ...]) -> PreparedTest:
-    """Open a bag whose files, and those of its IMU and site, are as they are now."""
-    imu = None if of.imu is None else load_imu(of.imu)
-    test = open_test(of.bag, of.site, imu, of.source, of.handheld, of.measured_noise)
-    return with_imu_file(test, of.imu).counted_from(of.reference_degc)
+class KeptOpen:
+    """Recordings that this process has opened, as many as memory holds: those that were asked for last."""
+
+    def __init__(self, most: int) -> None:
+        """Keep so many samples at most, but one recording of any length."""
+        self._most = most
+        self._tests: OrderedDict[tuple[BagSource, tuple[FileState, ...]], PreparedTest] = OrderedDict()
+
+    def of(self, source: BagSource, files: tuple[FileState, ...]) -> PreparedTest:
+        """Give an opened bag whose files, and those of its IMU and site, are as they are now."""
+        test = self._tests.pop((source, files), None) or source.opened()
+        self._tests[source, files] = test
+        while len(self._tests) > 1 and sum(len(t.recording.t) for t in self._tests.values()) > self._most:
+            self._tests.popitem(last=False)
+        return test
+
+
+_OPEN = KeptOpen(_KEPT_SAMPLES)
+"""Those of the sets that this process works on."""
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import lru_cache
 from multiprocessing import get_context
@@ -25,7 +25,6 @@ from sdimu_calibration.core.joint.member import Job, Report, tried
 from sdimu_calibration.core.joint.set_evidence import held_out_chance
 from sdimu_calibration.core.joint.set_fit import Run, SetFit
 from sdimu_calibration.core.joint.set_result import SCATTERS, set_outcome
-from sdimu_calibration.core.joint.shared_function import SharedFunction
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -91,8 +90,13 @@ def set_runner(
     if workers < 2 or count <= FEW:
         yield _kept(lambda jobs: _here(jobs, told), kept)
         return
-    with ProcessPoolExecutor(workers, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)) as pool:
-        yield _kept(lambda jobs: _in_pool(pool, jobs, told), kept)
+    with ExitStack() as running:
+        each = [running.enter_context(_one_process()) for _ in range(min(workers, count))]
+        yield _kept(Pool(each, told).do, kept)
+
+
+def _one_process() -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(1, get_context("spawn"), initializer=end_with, initargs=(os.getpid(),))
 
 
 def _here(jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
@@ -104,23 +108,44 @@ def _here(jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
     return done
 
 
-def _in_pool(pool: ProcessPoolExecutor, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
-    if any(not isinstance(e, str) for job in jobs for e in (*job.candidates, *job.model.effects)):
-        # An effect of the user's own is a function, which no other process knows.
-        return _here(jobs, told)
-    places = {pool.submit(tried, job): k for k, job in enumerate(jobs)}
-    found: dict[int, Report | DataError] = {}
-    for future in as_completed(places):
-        try:
-            found[places[future]] = future.result()
-        except BrokenProcessPool as error:
-            raise DataError(
-                "the system ended a process of --workers, usually because memory is short: state fewer; what is done "
-                "stays in the folder evidence of --out"
-            ) from error
-        if told:
-            told(len(found), len(jobs))
-    return [found[k] for k in range(len(jobs))]
+class Pool:
+    """Processes of this machine, of which each has recordings of its own: it keeps them open from job to job."""
+
+    def __init__(self, processes: Sequence[Executor], told: Told | None) -> None:
+        """Take processes of one job at a time; `told` as of `set_runner`."""
+        self._processes = processes
+        self._told = told
+        self._place: dict[str, int] = {}
+
+    def do(self, jobs: Sequence[Job]) -> list[Report | DataError]:
+        """Do jobs.
+
+        Raises
+        ------
+        DataError
+            Where the system ended a process.
+        """
+        if any(not isinstance(e, str) for job in jobs for e in (*job.candidates, *job.model.effects)):
+            # An effect of the user's own is a function, which no other process knows.
+            return _here(jobs, self._told)
+        places = {self._of(job).submit(tried, job): k for k, job in enumerate(jobs)}
+        found: dict[int, Report | DataError] = {}
+        for future in as_completed(places):
+            try:
+                found[places[future]] = future.result()
+            except BrokenProcessPool as error:
+                raise DataError(
+                    "the system ended a process of --workers, usually because memory is short: state fewer; what is "
+                    "done stays in the folder evidence of --out"
+                ) from error
+            if self._told:
+                self._told(len(found), len(jobs))
+        return [found[k] for k in range(len(jobs))]
+
+    def _of(self, job: Job) -> Executor:
+        """Give the process of the recording of a job: the next one in turn for a recording that is new."""
+        place = self._place.setdefault(job.member.name, len(self._place))
+        return self._processes[place % len(self._processes)]
 
 
 def _from_cluster(on_cluster: Any, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:
@@ -205,28 +230,13 @@ def job_number(job: Job) -> str:
         source.handheld,
         source.measured_noise,
         source.reference_degc,
-        job.model,
-        job.estimator,
-        job.local,
+        job.of_fit,
         job.candidates,
         job.with_local,
         job.stretches,
         job.rivals,
-        None if job.scatter is None else job.scatter.tobytes(),
-        None if job.function is None else _number_of_function(job.function),
-        job.noise,
-        job.imu,
-        None if job.about is None else sorted(job.about.items()),
-        None
-        if job.start is None
-        else (job.start.names, job.start.coefficients.tobytes(), job.start.C_nb.tobytes(), job.start.more.tobytes()),
     )
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
-
-
-def _number_of_function(shared: SharedFunction) -> tuple[object, ...]:
-    """Tell functions that a set shares apart: where they are, of which sensors and how large."""
-    return shared.functions.knots.tobytes(), shared.sensors, sorted(shared.size.items())
 
 
 @lru_cache(maxsize=1)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, reduce
 from sdimu_calibration.core.alignment.without import without
@@ -18,6 +19,8 @@ from sdimu_calibration.core.handheld.handheld import PreparedRun, Told, prepare_
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.specification import EPOCH_S, LONGEST_EPOCH_S, MOST_EPOCHS, ImuSpecification, Site
+
+A = TypeVar("A")
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,6 +127,21 @@ class PreparedTest:
             self._prepared[key] = reduce(self.recording, setup)
             let_go(self.recording.t, self.recording.omega_ib_b, self.recording.f_ib_b)
         return without(self._prepared[key], self.held_out, self.excluded)
+
+    def last(self, question: str, answer: Callable[[], A]) -> A:
+        """Give the answer to the question that was asked of this test last; work out that to another one, and keep it.
+
+        Parameters
+        ----------
+        question : str
+            All that the answer hangs on, but for the test.
+        """
+        asked, known = self._prepared.get("last", ("", None))
+        if asked == question:
+            return cast("A", known)
+        found = answer()
+        self._prepared["last"] = question, found
+        return found
 
     @cached_property
     def why_handheld(self) -> str:

@@ -85,6 +85,23 @@ class Job:
     rivals: bool = False
     """Also what the recording says in each noise that it may have."""
 
+    @property
+    def of_fit(self) -> str:
+        """All that the fit of the recording follows from, but for the recording; equal for equal fits."""
+        start, function = self.start, self.function
+        asked = (
+            *(self.model, self.estimator, self.local, self.imu, self.noise),
+            None if self.about is None else sorted(self.about.items()),
+            None
+            if start is None
+            else (start.names, start.coefficients.tobytes(), start.C_nb.tobytes(), start.more.tobytes()),
+            None if self.scatter is None else self.scatter.tobytes(),
+            None
+            if function is None
+            else (function.functions.knots.tobytes(), function.sensors, sorted(function.size.items())),
+        )
+        return repr(asked)
+
 
 @dataclass(frozen=True)
 class Report:
@@ -164,8 +181,12 @@ def tried(job: Job) -> Report | DataError:
 
 
 def fitted(job: Job) -> Fit:
-    """Fit the recording of a job."""
+    """Fit the recording of a job; where the last job of it asked for the same fit, that one."""
     test = job.member.open()
+    return test.last(job.of_fit, lambda: _fitted(job, test))
+
+
+def _fitted(job: Job, test: PreparedTest) -> Fit:
     model = replace(job.model, effects=(*_of_all(job.model.effects, job), *job.local))
     if job.imu is not None:
         test = test.with_imu(job.imu)
