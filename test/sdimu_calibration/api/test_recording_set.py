@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import sdimu_calibration as sdimu
+from sdimu_calibration.api.recording_set import JointFit
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.storage.files.fleet_folder import candidates, gather
@@ -74,10 +76,19 @@ def test_a_diagnosis_of_a_set_says_what_is_known_and_what_to_record(found):
 
 def test_files_are_those_of_the_verbs(fit, found, tmp_path):
     assert {p.name for p in fit.save(tmp_path / "cal").iterdir()} == {"result.json", "report.html"}
-    assert {p.name for p in found.save(tmp_path / "dia").iterdir()} == {"set.json", "result.json", "report.html"}
+    assert {p.name for p in found.save(tmp_path / "dia").iterdir()} == {"diagnosis.json", "result.json", "report.html"}
     np.testing.assert_array_equal(read_result(tmp_path / "cal").values, fit.values)
-    content = json.loads((tmp_path / "dia" / "set.json").read_text())
-    assert content["verdict"] == found.verdict
+    content = json.loads((tmp_path / "dia" / "diagnosis.json").read_text())
+    assert (content["format"], content["verdict"]) == ("sdimu-diagnosis/1", found.verdict)
+    # Keys that programs read are those of one recording.
+    (first, *_), best = content["candidates"], found.best
+    assert (first["effect"], first["label"]) == (best.family, best.label)
+    assert first["parameters"][0]["value"] == best.value
+    assert first["indistinguishable_from"] == list(best.alike)
+    assert first["delta_log_likelihood"] == pytest.approx(0.5 * best.z**2)
+    assert content["p_value"] <= first["p_value_adjusted"] < 1e-6
+    assert not content["adequate"]
+    assert not content["unexplained"]["is"]
     # A fleet reads from a set what it reads from a diagnosis of one recording.
     given = gather([tmp_path / "dia"]).given
     assert [entry.unit for entry in given] == ["SN3"]
@@ -91,5 +102,8 @@ def test_what_cannot_be_used_is_one_line(fit, opened, tmp_path):
         sdimu.open_set([tmp_path / "nothing"])
     with pytest.raises(DataError, match="one recording"):
         sdimu.diagnose(fit, refits=True)
+    one = replace(opened, core=replace(opened.core, members=opened.members[:1]))
+    with pytest.raises(DataError, match=r"a set of one recording: open it with open\(bag, ...\)"):
+        sdimu.diagnose(JointFit(one, fit.options, fit.core))
     with pytest.raises(DataError, match=r"open_set"):
         sdimu.calibrate([opened])

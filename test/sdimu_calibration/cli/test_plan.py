@@ -39,7 +39,7 @@ def standing() -> Standing:
 
 @pytest.fixture
 def folder(standing, tmp_path):
-    write_json(tmp_path / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(standing).plain()})
+    write_json(tmp_path / "diagnosis.json", {"format": "sdimu-diagnosis/1", "known": KnownEntry.of(standing).plain()})
     return tmp_path
 
 
@@ -104,10 +104,10 @@ def test_results_beside_others_may_count_a_recording_twice_and_are_refused(folde
 
 
 def test_results_of_another_version_are_told(folder):
-    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1"})
+    write_json(folder / "diagnosis.json", {"format": "sdimu-diagnosis/1"})
     with pytest.raises(DataError, match="run sdimu diagnose again"):
         plan(plan="kim18", after=[folder])
-    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": {"names": ["gyro_bias_x"]}})
+    write_json(folder / "diagnosis.json", {"format": "sdimu-diagnosis/1", "known": {"names": ["gyro_bias_x"]}})
     with pytest.raises(DataError, match="damaged"):
         plan(plan="kim18", after=[folder])
 
@@ -117,15 +117,15 @@ def test_information_that_is_of_no_data_is_refused(standing, folder, row, column
     J = standing.known.J.copy()
     J[row, column] = value
     damaged = replace(standing, known=replace(standing.known, J=J))
-    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
-    with pytest.raises(DataError, match=r"set\.json: known: damaged .*(below zero|of no data)"):
+    write_json(folder / "diagnosis.json", {"format": "sdimu-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
+    with pytest.raises(DataError, match=r"diagnosis\.json: known: damaged .*(below zero|of no data)"):
         read_standing(folder)
 
 
 @pytest.mark.parametrize("prior", [0.0, -1.0])
 def test_a_prior_of_nothing_is_refused(standing, folder, prior):
     damaged = replace(standing, known=replace(standing.known, prior=np.full(len(standing.known.prior), prior)))
-    write_json(folder / "set.json", {"format": "sdimu-set-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
+    write_json(folder / "diagnosis.json", {"format": "sdimu-diagnosis/1", "known": KnownEntry.of(damaged).plain()})
     with pytest.raises(DataError, match="a prior is not above zero"):
         read_standing(folder)
 

@@ -11,10 +11,13 @@ import pytest
 
 from sdimu_calibration.cli.next_commands import spelled
 from sdimu_calibration.cli.options import FitRequest, StatedOpening
-from sdimu_calibration.cli.set_run import SetRequest, page_title, table_heading, to_repeat
+from sdimu_calibration.cli.set_run import SetRequest, page_title, table_heading, the_only, to_repeat
 from sdimu_calibration.core.advice import Advice, Kind, Verb
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary, no_history
 from sdimu_calibration.report.page import Contents, page
+from sdimu_calibration.storage.files.config import load_imu, load_plan, load_site
+from sdimu_sim.bag_file import write_test
+from sdimu_sim.core.scenario import Scenario, simulate_test
 
 RESULT = Calibration(
     "prior",
@@ -71,6 +74,31 @@ def test_what_is_advised_repeats_all_that_was_asked(bags, file, of_what):
         f"sdimu calibrate {of_what} --site daejeon --imu dtg --model mine.yaml --gyro-unit deg/s "
         "--add accel_cubic_x --add 'accel_quadratic_z'"
     )
+
+
+def test_a_set_file_of_one_recording_is_that_recording(tmp_path):
+    """What the file says of it counts as if it was stated; options come before the serial number of the file."""
+    plan = load_plan("recommended")
+    plan = replace(plan, dwell_s=(20.0, 20.0), turns=plan.turns[:1])
+    scenario = Scenario(plan, load_imu("dtg"), load_site("daejeon"), rate_hz=10.0, seed=1, unit=1)
+    write_test(tmp_path / "day1", scenario, simulate_test(scenario), custom={"serial": "SN1", "power_on": "3"})
+    file = tmp_path / "set.yaml"
+    file.write_text(
+        "model: hand\nestimator: batch\nsite: daejeon\nimu: dtg\nreference_temperature: 20 degC\n"
+        "recordings:\n- {bag: day1, name: first}\n"
+    )
+    asked = FitRequest(set_file=file, out=Path("out"))
+    bag, opening, request = the_only(None, StatedOpening(gyro_unit="deg/s"), asked)
+    assert bag == tmp_path / "day1"
+    assert (opening.site, opening.imu, opening.gyro_unit) == ("daejeon", "dtg", "deg/s")
+    assert (opening.serial, opening.power_on, opening.reference_degc) == ("SN1", "3", 20.0)
+    assert request == FitRequest(model="hand", estimator="batch", out=Path("out"))
+    _, opening, request = the_only(
+        None, StatedOpening(serial="7"), replace(asked, estimator="filter", model="baseline")
+    )
+    assert (opening.serial, request.estimator, request.model) == ("7", "filter", "baseline")
+    file.write_text("recordings:\n- {bag: day1, name: a}\n- {bag: day1, name: b}\n")
+    assert the_only(None, StatedOpening(), asked) == SetRequest((), StatedOpening(), asked)
 
 
 @pytest.mark.parametrize(("names", "said"), [(("day1", "day2"), "day1, day2<"), ("abcdef", "a, b, c, d and others<")])

@@ -78,6 +78,8 @@ class OpenedSet:
 
     def diagnose(self, fit: JointFit, extra: Sequence[Effect], progress: Progress) -> JointDiagnosis:
         """Find what the model of a fit of this set misses."""
+        if len(self) < 2:
+            raise DataError("diagnose(fit=...): a set of one recording: open it with open(bag, ...) instead")
         with set_runner(len(self), self.workers, self.kept) as run:
             return JointDiagnosis(self, diagnose_set(self.members, fit.options, run, extra, progress, fitted=fit.core))
 
@@ -178,11 +180,11 @@ class JointDiagnosis(Diagnosed):
         return _of_unit(self.core.after, self.of)
 
     def save(self, folder: str | Path) -> Path:
-        """Write set.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
+        """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""
         folder = results_folder(folder)
         title = f"Diagnosis of {of_recordings(self.result).counted}"
         with written_together(folder) as part:
-            write_set_diagnosis(part / "set.json", self.core)
+            write_set_diagnosis(part / "diagnosis.json", self.core)
             write_result(part / "result.json", self.result, self.core.verdict)
             write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder

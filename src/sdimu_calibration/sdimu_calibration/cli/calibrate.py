@@ -16,7 +16,7 @@ from sdimu_calibration.cli.opened import default_folder, explained, folder_for_r
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening
 from sdimu_calibration.cli.progress import bar
-from sdimu_calibration.cli.set_run import SetRequest, calibrate_together, refuse_for_sets, single
+from sdimu_calibration.cli.set_run import SetRequest, calibrate_together, refuse_for_sets, the_only
 from sdimu_calibration.core.note import MISFITS, topic_of
 from sdimu_calibration.core.units import STANDARD_GRAVITY
 from sdimu_calibration.storage.files.whole_file import written_together
@@ -58,11 +58,12 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
             "out, or see sdimu study mount",
             param_hint="--truth",
         )
-    bag = single(bags, request.set_file)
-    if bag is None:
+    one = the_only(bags, opening, request)
+    if isinstance(one, SetRequest):
         refuse_for_sets(opening, truth=truth)
-        calibrate_together(SetRequest(bags or [], opening, request))
+        calibrate_together(one)
         return
+    bag, opening, request = one
     folder = folder_for_result(request.out or default_folder(bag))
     test, wanted, chosen = opened(console, bag, opening, request)
     notes = test.recording.notes

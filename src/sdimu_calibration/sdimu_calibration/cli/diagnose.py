@@ -16,7 +16,7 @@ from sdimu_calibration.cli.opened import default_folder, explained, leave, opene
 from sdimu_calibration.cli.option_groups import with_options
 from sdimu_calibration.cli.options import BagsArgument, FitRequest, StatedOpening, results_in
 from sdimu_calibration.cli.progress import bar
-from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, single
+from sdimu_calibration.cli.set_run import SetRequest, diagnose_together, refuse_for_sets, the_only
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.storage.files.whole_file import written_together
 
@@ -73,11 +73,13 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     if request.bootstrap and asked == HANDHELD:
         raise DataError(NO_BOOTSTRAP)
     extra = [effect for text in request.attempt or [] for effect in find_effects(text)]
-    bag = single(bags, request.set_file)
-    if bag is None:
+    one = the_only(bags, opening, request)
+    if isinstance(one, SetRequest):
         refuse_for_sets(opening, bootstrap=request.bootstrap, grow=request.grow)
-        diagnose_together(SetRequest(bags or [], opening, request), extra)
+        diagnose_together(one, extra)
         return
+    bag, opening, request = one
+    asked = request.asked_estimator
     folder = request.out or default_folder(bag, "diagnosis")
     check_plan_room(folder)
     test, wanted, chosen = opened(console, bag, opening, request)

@@ -124,7 +124,7 @@ def printing(console: Console, asked: bool) -> Callable[[Path], None]:
 
 def folder_for_result(folder: Path) -> Path:
     """Return the folder of a calibration; one that holds a diagnosis is refused, as half of it would be replaced."""
-    if (folder / "diagnosis.json").exists() or (folder / "set.json").exists():
+    if (folder / "diagnosis.json").exists():
         raise DataError(
             f"{folder} holds a diagnosis, whose result.json and report.html would be replaced: choose another --out, "
             "or remove that folder"

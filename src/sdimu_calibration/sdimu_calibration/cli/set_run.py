@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
@@ -29,7 +29,10 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.joint.set_fit import Run, SetOptions
     from sdimu_calibration.core.progress import Progress
     from sdimu_calibration.core.results import Calibration
+    from sdimu_calibration.storage.recording_set import BagSource
     from sdimu_calibration.storage.trace import Trace
+
+R = TypeVar("R", bound=FitRequest)
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,56 @@ def single(bags: list[Path] | None, file: Path | None) -> Path | None:
     if file is None and not bags:
         raise typer.BadParameter("name a bag, several bags of one unit, or --set FILE", param_hint="BAG")
     return bags[0] if file is None and bags is not None and len(bags) == 1 else None
+
+
+def the_only(bags: list[Path] | None, opening: StatedOpening, request: R) -> tuple[Path, StatedOpening, R] | SetRequest:
+    """Return the only recording with how it is opened and what is asked of it, or several as a set.
+
+    A set file of one recording is that recording, with what the file says of it.
+    """
+    bag = single(bags, request.set_file)
+    if bag is not None:
+        return bag, opening, request
+    if request.set_file is None:
+        return SetRequest(bags or [], opening, request)
+    from sdimu_calibration.core.estimation.solve import AUTO
+    from sdimu_calibration.storage.recording_set import BagSource, load_set
+
+    wanted = load_set(request.set_file, _as_stated(opening, request))
+    source = wanted.members[0].open
+    if len(wanted.members) > 1 or not isinstance(source, BagSource):
+        return SetRequest((), opening, request)
+    (member,) = wanted.members
+    degc = None if source.reference_degc is None else f"{source.reference_degc:g} degC"
+    opening = replace(
+        opening,
+        site=source.site,
+        imu=source.imu,
+        serial=opening.serial or member.serial or None,
+        power_on=opening.power_on or member.power_on or None,
+        reference_temperature=degc,
+    )
+    estimator = request.estimator if request.asked_estimator != AUTO else wanted.estimator
+    return (
+        source.bag,
+        opening,
+        replace(request, set_file=None, estimator=estimator, model=request.model or wanted.model),
+    )
+
+
+def _as_stated(opening: StatedOpening, request: FitRequest) -> BagSource:
+    """Make what the options state of all recordings of a set."""
+    from sdimu_calibration.storage.recording_set import BagSource
+
+    return BagSource(
+        Path(),
+        opening.site,
+        opening.imu,
+        opening.source,
+        request.handheld,
+        opening.measured_noise,
+        opening.reference_degc,
+    )
 
 
 def refuse_for_sets(opening: StatedOpening, **options: object) -> None:
@@ -104,7 +157,7 @@ def calibrate_together(asked: SetRequest) -> None:
 
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
-    """Find what the model of a set misses; leaves set.json, result.json and report.html."""
+    """Find what the model of a set misses; leaves diagnosis.json, result.json and report.html."""
     from sdimu_calibration.core.error_figures import held_out
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
@@ -117,7 +170,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     folder = _folder(asked, "diagnosis")
     about = to_repeat(asked, folder)
     with written_together(folder) as part:
-        write_set_diagnosis(part / "set.json", found)
+        write_set_diagnosis(part / "diagnosis.json", found)
         write_result(part / "result.json", after, found.verdict)
         write_report(
             part / "report.html",
@@ -135,7 +188,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     _show(console, after)
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
-    answer(folder / "set.json", asked.request.as_json)
+    answer(folder / "diagnosis.json", asked.request.as_json)
     leave(after, (found.verdict, found.sentence))
 
 
@@ -160,19 +213,11 @@ def diagnosed_set(
 @contextmanager
 def _begun(console: Console, asked: SetRequest) -> Iterator[tuple[tuple[Member, ...], SetOptions, Run, Progress]]:
     """Members, options and runner of what is asked, with a bar that shows the recordings that are done."""
-    from sdimu_calibration.storage.recording_set import BagSource, load_set, set_of, set_options
+    from sdimu_calibration.storage.recording_set import load_set, set_of, set_options
     from sdimu_calibration.storage.set_work import set_runner
 
     opening, request = asked.opening, asked.request
-    like = BagSource(
-        Path(),
-        opening.site,
-        opening.imu,
-        opening.source,
-        request.handheld,
-        opening.measured_noise,
-        opening.reference_degc,
-    )
+    like = _as_stated(opening, request)
     wanted = set_of(asked.bags, like) if asked.file is None else load_set(asked.file, like)
     serial = opening.serial
     members = tuple(

@@ -20,7 +20,7 @@ from sdimu_calibration.core.plan import Plan, backwards
 from sdimu_calibration.report.set_sections import recurrence_section
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.config import load_model
-from sdimu_calibration.storage.files.diagnosis_file import SET_FORMAT, write_set_diagnosis
+from sdimu_calibration.storage.files.diagnosis_file import FORMAT, write_set_diagnosis
 from sdimu_calibration.storage.files.json_file import read_json
 from sdimu_calibration.storage.kept_report import read_report, write_report
 from sdimu_sim.core.temperature import TemperatureProfile
@@ -176,12 +176,12 @@ def test_a_set_says_what_comes_back(tmp_path):
     assert "the same in all recordings, explains it." in found.sentence
     assert found.unknown
     assert any("--try FILE" in line for line in map(sentence, found.advice))
-    write_set_diagnosis(tmp_path / "set.json", found)
-    content = read_json(tmp_path / "set.json", SET_FORMAT)["recurrence"]
+    write_set_diagnosis(tmp_path / "diagnosis.json", found)
+    content = read_json(tmp_path / "diagnosis.json", FORMAT)["recurrence"]
     assert content["answer"] == [ATTITUDE]
     assert content["kinds"][0]["probability"] > 0.5
     assert content["sensors"][0] == "accel_x"
-    assert read_json(tmp_path / "set.json", SET_FORMAT)["function"] > 0.5
+    assert read_json(tmp_path / "diagnosis.json", FORMAT)["function"] > 0.5
 
 
 def _kinds(shares: tuple[float, float, float]) -> tuple[Kind, ...]:

@@ -37,7 +37,6 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.posterior.told import Probabilities, Share, may_be, probabilities
-from sdimu_calibration.core.probability import normal_tail
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.results import Calibration
@@ -273,11 +272,8 @@ def p_value(done: Round, consistency: Consistency, noise: bool) -> float:
     noise : bool
         Whether the NIS counts: the noise is not as specified, or something faster than a dwell is left.
     """
-    first = done.found.first
-    largest = float(np.max(np.abs(first.z), initial=0.0))
-    count = int(np.isfinite(first.sigma).sum()) + done.found.passed
-    of_scan = min(1.0, count * 2.0 * normal_tail(largest))
+    of_scan = done.found.p_value
     if not len(done.free):
-        return float(of_scan)
+        return of_scan
     of_noise = consistency.nis_p_value if noise else 1.0
     return float(min(1.0, 3.0 * min(of_scan, done.left_before.p_value, of_noise)))

@@ -24,6 +24,7 @@ from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.noise_term import FOLLOWS, KINDS, TRIADS, NoiseTerm
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior, posterior
+from sdimu_calibration.core.probability import normal_tail
 
 FALSE_ALARM = 0.02
 """Probability (1) that pure noise puts one of all candidates over the threshold that is drawn beside a scan: one
@@ -63,6 +64,16 @@ class Search(Generic[E]):
     def candidates(self) -> tuple[Candidate, ...]:
         """What was found: the largest share of the misfit first."""
         return tuple(self.evidence.candidate(column) for column in self.chosen.tolist())
+
+    @property
+    def p_value(self) -> float:
+        """Probability that noise puts any candidate as far out as the first of its scan (Bonferroni)."""
+        return self.p_value_of(float(np.max(np.abs(self.first.z), initial=0.0)))
+
+    def p_value_of(self, z: float) -> float:
+        """Probability that noise puts any of the candidates that were looked at so far out (Bonferroni)."""
+        count = int(np.isfinite(self.first.sigma).sum()) + self.passed
+        return float(min(1.0, count * 2.0 * normal_tail(abs(z))))
 
     def columns_alike(self, place: int) -> list[int]:
         """Columns of what may be in the place of one of `chosen`, by its place there; the likeliest first."""

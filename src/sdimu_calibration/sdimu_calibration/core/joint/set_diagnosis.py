@@ -171,7 +171,7 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     shared = [
         (
             *(c.label, c.effect.title, "", place_of(names, c), z, c.parameter),
-            *(found.alike.get(c.label, ()), found.probability.get(c.label, float("nan"))),
+            *(found.alike.get(c.label, ()), found.probability.get(c.label, float("nan")), c.family),
         )
         for c, z in zip(found.chosen, found.z, strict=True)
     ]
@@ -181,15 +181,17 @@ def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
         parameter = effect.parameters[0]
         place = place_of_local(names, find)
         title = f"{effect.title}, changed" if is_change(find.key) else effect.title
-        own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability))
+        family = effect.family or effect.name
+        own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability, family))
     recordings = [report.name for report in found.after.reports]
     return tuple(
         SetFinding(
             *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
             *(tuple(alike), probability, found.may_be.get(tagged(label, recording) if recording else label, ())),
             _against(label, recording, recordings),
+            family,
         )
-        for label, title, recording, k, z, p, alike, probability in (*shared, *own)
+        for label, title, recording, k, z, p, alike, probability, family in (*shared, *own)
     )
 
 

@@ -52,6 +52,8 @@ class SetFinding:
     against: str = ""
     """The other one of two recordings, where a coefficient is not the same in both: no data tell which of them changed.
     Empty for all else."""
+    family: str = ""
+    """Of the effect, without axis and variant."""
 
     @property
     def decided(self) -> bool:

@@ -1,4 +1,4 @@
-"""The result of a diagnosis as diagnosis.json, that of a set as set.json: SI numbers, names as everywhere."""
+"""The result of a diagnosis, of one recording or of a set, as diagnosis.json: SI numbers, names as everywhere."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 
     # A diagnosis of one recording does not load what joins several.
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
+    from sdimu_calibration.core.joint.set_verdict import SetFinding
 
 FORMAT: Final = "sdimu-diagnosis/1"
-SET_FORMAT: Final = "sdimu-set-diagnosis/1"
 _MOST = 5000
 """Number of estimates at most: a catalogue has hundreds, and what is unpacked must be bounded."""
 _TEST = "chi2 dof p=p_value"
@@ -63,7 +63,10 @@ class Alone(ResultModel):
 
 
 class DiagnosisFile(ResultModel):
-    """diagnosis.json, in the order of its keys; what stands in them only for people is not looked into."""
+    """diagnosis.json, in the order of its keys; what stands in them only for people is not looked into.
+
+    The last ones are of a set, which has no keys that only one recording fills.
+    """
 
     format: Literal["sdimu-diagnosis/1"] = FORMAT
     estimator: Line = ""
@@ -92,6 +95,10 @@ class DiagnosisFile(ResultModel):
     smallest_detectable: Rows = ()
     assumed_absent: Rows = ()
     bootstrap: Row = None
+    function: Number | None = None
+    functions: Rows = ()
+    refused: tuple[Line, ...] = ()
+    recurrence: Row = None
 
 
 def write_diagnosis(path: Path, summary: DiagnosisSummary, null: Null | None = None, in_use: Row = None) -> None:
@@ -305,54 +312,49 @@ def _reason(summary: DiagnosisSummary, r: DetectableSize) -> str:
     return next((b.reason for b in summary.untestable if r.label in b.labels), "")
 
 
-class SetDiagnosisFile(ResultModel):
-    """set.json, in the order of its keys."""
-
-    format: Literal["sdimu-set-diagnosis/1"] = SET_FORMAT
-    verdict: Line = ""
-    sentence: Said = ""
-    threshold: Number = np.nan
-    probabilities: Row = None
-    function: Number | None = None
-    functions: Rows = ()
-    findings: Rows = ()
-    refused: tuple[Line, ...] = ()
-    held_out_before: Number = np.nan
-    held_out_after: Number = np.nan
-    advice: tuple[Said, ...] = ()
-    known: Any = None
-    fit: Any = None
-    alone: Any = None
-    recurrence: Row = None
-
-
 def _recurrence(found: Recurrence) -> dict[str, Any]:
     return {"answer": list(found.answer), "apart": found.apart, **asdict(found)}
 
 
 def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
-    """Write set.json: verdict, sentence, findings (SI), advice, what is known of the unit, and what comes back."""
-    SetDiagnosisFile.model_construct(
-        format=SET_FORMAT,
+    """Write diagnosis.json of a set."""
+    is_unexplained = found.verdict == Verdict.UNEXPLAINED
+    DiagnosisFile.model_construct(
+        format=FORMAT,
+        estimator=found.after.estimator,
+        adequate=found.verdict == Verdict.CONSISTENT,
+        p_value=found.first.p_value,
         verdict=found.verdict,
         sentence=found.sentence,
-        threshold=found.threshold,
         probabilities=odds(found.probabilities),
+        candidates=[_of_set(f, found) for f in found.findings],
+        unexplained={"is": is_unexplained, "fraction": float(is_unexplained), "best_variables": []},
+        advice=tuple(map(sentence, found.advice)),
+        consistency={"threshold": found.threshold},
+        alone=alone(found.first.evidence),
+        known=KnownEntry.of(found.standing),
+        fit={"before": fit_of(found.before), "after": fit_of(found.after)},
         function=found.function,
         functions=[asdict(one) | {"sensors": list(one.sensors)} for one in found.functions],
-        findings=[asdict(f) | {"alike": list(f.alike), "may_be": _shares(f.may_be)} for f in found.findings],
         refused=[f.label for f in found.refused],
-        held_out_before=found.error_without,
-        held_out_after=found.after.fit["held_out_rms"],
-        advice=tuple(map(sentence, found.advice)),
-        known=KnownEntry.of(found.standing),
-        fit={"before": {"model": list(found.before.model)}},
-        alone=alone(found.first.evidence),
         # None where the model leaves nothing in the stops.
         recurrence=None if found.recurrence is None else _recurrence(found.recurrence),
     ).write(Path(path))
 
 
-def read_set_diagnosis(path: Path) -> SetDiagnosisFile:
-    """Read set.json."""
-    return read_model(path, SetDiagnosisFile)
+def _of_set(f: SetFinding, found: SetDiagnosis) -> dict[str, Any]:
+    """Give an effect that was found in a set as plain data; held-out errors are those without and with all of them."""
+    return {
+        **entry(f, "effect=family label"),
+        "parameters": [entry(f, "name=label value sigma unit display_unit")],
+        "probability": f.probability,
+        "may_be": _shares(f.may_be),
+        "z": f.z,
+        "delta_log_likelihood": 0.5 * f.z**2,
+        "p_value_adjusted": found.first.p_value_of(f.z),
+        "explained": float("nan"),
+        "held_out_rms_before": found.error_without,
+        "held_out_rms_after": found.after.fit["held_out_rms"],
+        "indistinguishable_from": list(f.alike),
+        **entry(f, "recording against"),
+    }

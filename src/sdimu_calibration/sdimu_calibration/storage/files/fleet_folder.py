@@ -15,19 +15,11 @@ from sdimu_calibration.core.fleet.population import Measured, measured
 from sdimu_calibration.core.fleet.study import Candidates
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
-from sdimu_calibration.storage.files.diagnosis_file import (
-    Alone,
-    DiagnosisFile,
-    SetDiagnosisFile,
-    read_diagnosis,
-    read_set_diagnosis,
-    unpacked,
-)
+from sdimu_calibration.storage.files.diagnosis_file import Alone, DiagnosisFile, read_diagnosis, unpacked
 from sdimu_calibration.storage.files.result_file import read_result
 from sdimu_calibration.storage.files.whole_file import RESULT
 
-DIAGNOSIS, SET = "diagnosis.json", "set.json"
-Diagnosis = DiagnosisFile | SetDiagnosisFile
+DIAGNOSIS = "diagnosis.json"
 
 
 @dataclass(frozen=True)
@@ -39,8 +31,8 @@ class Entry:
     path: Path
     """Its folder."""
     result: Calibration
-    diagnosis: Diagnosis | None
-    """Content of diagnosis.json or set.json beside it."""
+    diagnosis: DiagnosisFile | None
+    """Content of diagnosis.json beside it."""
 
     @property
     def unit(self) -> str:
@@ -139,11 +131,9 @@ def _read(name: str, path: Path, apart: list[str]) -> Entry | None:
     return entry
 
 
-def _diagnosis_beside(folder: Path) -> Diagnosis | None:
+def _diagnosis_beside(folder: Path) -> DiagnosisFile | None:
     """Read the diagnosis of a recording, or of a set, beside its result; None where there is none."""
-    if (folder / DIAGNOSIS).is_file():
-        return read_diagnosis(folder / DIAGNOSIS)
-    return read_set_diagnosis(folder / SET) if (folder / SET).is_file() else None
+    return read_diagnosis(folder / DIAGNOSIS) if (folder / DIAGNOSIS).is_file() else None
 
 
 def _misfit(entry: Entry, main: tuple[str, tuple[str, ...], str], one_model: bool) -> str:

@@ -1,4 +1,4 @@
-"""What is known of a unit: entry ``known`` of diagnosis.json and set.json (SI), and what a result alone knows."""
+"""What is known of a unit: entry ``known`` of diagnosis.json (SI), and what a result alone knows."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from sdimu_calibration.storage.files.result_model import Array, Line, ResultMode
 
 _ROUNDING = 1e-6
 """Share of the information of two coefficients (1) by which rounding may move what they have in common."""
-FILES = {"set.json": "sdimu-set-diagnosis/1", "diagnosis.json": "sdimu-diagnosis/1"}
-"""Files that hold what is known, and their formats."""
+FILE, FORMAT = "diagnosis.json", "sdimu-diagnosis/1"
+"""File that holds what is known, and its format."""
 
 
 class KnownEntry(ResultModel):
@@ -65,16 +65,16 @@ def _check_information(information: Floats) -> None:
 
 
 def holds_standing(path: Path) -> bool:
-    """Whether a path is a folder of results of a diagnosis, or one of its files."""
+    """Whether a path is a folder of results of a diagnosis, or its diagnosis.json."""
     path = Path(path)
-    return path.name in FILES if path.is_file() else any((path / name).is_file() for name in FILES)
+    return path.name == FILE if path.is_file() else (path / FILE).is_file()
 
 
 def read_standing(path: Path) -> Standing:
-    """Read what a diagnosis knows. `path`: folder of its results, or set.json or diagnosis.json in it."""
+    """Read what a diagnosis knows. `path`: folder of its results, or diagnosis.json in it."""
     path = Path(path)
-    file = path if path.is_file() else next((path / n for n in FILES if (path / n).is_file()), path / "diagnosis.json")
-    content = read_json(file, FILES.get(file.name, "sdimu-diagnosis/1"))
+    file = path if path.is_file() else path / FILE
+    content = read_json(file, FORMAT)
     if not content.get("known"):
         raise DataError(f"{file}: does not say what is known of the unit; run sdimu diagnose again")
     try:

@@ -16,7 +16,7 @@ from pathlib import Path
 from sdimu_calibration.core.data_error import DataError
 
 RESULT = "result.json"
-COMPANIONS = ("report.html", "report.pdf", "diagnosis.json", "set.json")
+COMPANIONS = ("report.html", "report.pdf", "diagnosis.json")
 """Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
 
 
