@@ -157,10 +157,10 @@ def test_a_fit_in_python_prints_the_figure_in_that_noise_first(learned):
 
 
 def test_p_takes_the_nis_in_white_noise_and_is_called_so(learned, diagnosis):
-    first = SimpleNamespace(z=np.array([1.0, -2.0]), sigma=np.ones(2))
     done = SimpleNamespace(
-        found=SimpleNamespace(first=first, passed=0), free=np.arange(3), left_before=SimpleNamespace(p_value=0.3)
+        found=SimpleNamespace(p_value=0.2), free=np.arange(3), left_before=SimpleNamespace(p_value=0.3)
     )
+    assert p_value(done, SimpleNamespace(nis_p_value=0.0), noise=False) == pytest.approx(0.6)
     assert p_value(done, SimpleNamespace(nis_p_value=0.0), noise=True) == 0.0
     assert "that a right model in white noise looks like this" in sections.numbers(learned)
     assert "that a right model looks like this" in sections.numbers(diagnosis)

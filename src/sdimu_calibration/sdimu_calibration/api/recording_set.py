@@ -25,6 +25,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, SetSummary, of_recordings
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.set_sections import stop_maps
 from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
 from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
@@ -34,6 +35,8 @@ from sdimu_calibration.storage.recording_set import RecordingSet
 from sdimu_calibration.storage.set_work import judged_outcome, set_runner
 
 if TYPE_CHECKING:
+    from plotly.graph_objects import Figure as Live
+
     from sdimu_calibration.core.evidence.known import Standing
 
 
@@ -178,6 +181,12 @@ class JointDiagnosis(Diagnosed):
     def result(self) -> Calibration:
         """The result with everything that was found."""
         return _of_unit(self.core.after, self.of)
+
+    def plot_heat_map(self) -> Live:
+        """Error of every sensor in every stop of the recordings over its sigma, with the model as given (plotly)."""
+        if not self.core.where:
+            raise DataError(f"no stop was looked at: {self.sentence}")
+        return stop_maps(self.core)[0].as_plotly()
 
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, result.json and report.html into a folder, as `sdimu diagnose` does."""

@@ -45,10 +45,13 @@ def heat_maps(
     grids: Sequence[data.Grid], channels: Sequence[str] = CHANNEL_NAMES, place: str = "stop", height: int = 330
 ) -> Figure:
     """Draw heat maps of several models with one scale of colours upon each other; a switch of the page shows one."""
-    figure = heat_map(grids[0], channels, place)
-    for grid in grids[1:]:
-        other = heat_map(grid, channels, place).data[0]
-        figure.data.append({**other, "visible": False})
+    return upon_each_other([heat_map(grid, channels, place) for grid in grids], height)
+
+
+def upon_each_other(maps: Sequence[Figure], height: int) -> Figure:
+    """Lay maps of the same cells upon each other; a switch of the page shows one."""
+    figure, *others = maps
+    figure.data += [{**other.data[0], "visible": False} for other in others]
     return lay_out(figure, height, margin={"l": 95, "r": 10, "t": 12, "b": 45})
 
 

@@ -26,7 +26,7 @@ from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section
 from sdimu_calibration.report.odds_section import odds_of_set, odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
-from sdimu_calibration.report.set_sections import recurrence_section, set_sections
+from sdimu_calibration.report.set_sections import recurrence_section, set_sections, where_it_fails
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.table import as_far
 from sdimu_calibration.report.traceability import recorded, traceability
@@ -150,7 +150,7 @@ def _first(calibration: Calibration, contents: Contents, fit: Fit | None, draw: 
         maps = handheld_sections.heat_maps(summary, draw) if handheld else sections.heat_maps(summary.diagnosis, draw)
         return first_screen.render(verdict, maps)
     if of_set is not None:
-        return first_screen.render(first_screen.of_set(of_set, spell))
+        return first_screen.render(first_screen.of_set(of_set, spell), where_it_fails(of_set, draw))
     caption = sections.caption_of_map(bool(calibration.noise), bool(calibration.misfits))
     maps = sections.heat_map_card([fit.consistency()], draw, caption) if isinstance(fit, NavigationFit) else ""
     return first_screen.render(first_screen.of_fit(calibration, spell), maps)

@@ -7,17 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.probability import in_percent
-from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary
+from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary, of_recordings
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.evidence_figures import deviates
+from sdimu_calibration.report.data import NOTABLE
+from sdimu_calibration.report.drawing import Figure
+from sdimu_calibration.report.evidence_figures import deviates, upon_each_other
 from sdimu_calibration.report.groups import free
-from sdimu_calibration.report.markup import Draw, grid, quiet, section
+from sdimu_calibration.report.markup import Draw, grid, quiet, section, switched
 from sdimu_calibration.report.table import with_sigma
 
 if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.recurrence import Recurrence
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
+_MAP = 300
+"""Height of the map of all stops (px): six lines."""
 _TRENDS = 8
 """Number of trends that are listed: the others are further inside chance."""
 
@@ -120,6 +126,32 @@ def _trends(calibration: Calibration, of_set: SetSummary) -> list[str]:
             quiet("p: probability of such a slope by chance, all coefficients and covariates counted."),
         )
     ]
+
+
+def where_it_fails(found: SetDiagnosis, draw: Draw) -> str:
+    """Return a card with what is left in each stop of each recording; empty where nothing was looked at."""
+    if not found.where:
+        return ""
+    maps = stop_maps(found)
+    asked, every = len({one.recording for one in found.where}), len(of_recordings(found.after).recordings)
+    some = f" Of {every} recordings, {asked} were asked." if asked < every else ""
+    return section(
+        "Where it fails: sensor by stop",
+        switched(draw(upon_each_other(maps, _MAP)), ("model as given", "with what was found")[: len(maps)]),
+        quiet(
+            "A cell is the error that a sensor of a recording has in a stop beyond the joint estimate, over its sigma "
+            f"in white noise. It counts beyond {NOTABLE:.0f}: of 200 cells, one is chance.{some}"
+        ),
+    )
+
+
+def stop_maps(found: SetDiagnosis) -> list[Figure]:
+    """Draw what is left in each stop with the model as given and, where something was found, with that."""
+    stops = dict.fromkeys((one.recording, one.stop) for one in found.where)
+    deviate = np.array([(one.before, one.after) for one in found.where]).reshape(len(stops), len(CHANNELS), 2)
+    columns = [f"{recording} {stop}" for recording, stop in stops]
+    values = [deviate[:, :, k].T for k in range(2 if found.findings else 1)]
+    return [deviates(columns, CHANNELS, value, "recording and stop", "channel", _MAP) for value in values]
 
 
 def recurrence_section(found: Recurrence) -> str:

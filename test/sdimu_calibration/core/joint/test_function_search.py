@@ -29,6 +29,10 @@ class Found:
         return f"fit of {self.name}"
 
     @property
+    def before(self):
+        return SimpleNamespace(names=("as given",))
+
+    @property
     def after(self):
         return SimpleNamespace(function=self.function)
 
@@ -64,8 +68,10 @@ class Stage:
             self.asked += [f"function of {one}" for one in sensors]
             return SimpleNamespace(function="function" if sensors else None)
 
-        def leftovers(fit, _):
+        def leftovers(fit, _, given):
+            assert given == ("as given",)
             self.asked.append(f"left by {fit}")
+            return SimpleNamespace(where=(f"left by {fit}",))
 
         for name, what in (
             ("search_set", lambda *_: self.first),
@@ -93,6 +99,7 @@ def test_one_that_the_search_asked_for_stays_where_it_is_likely(monkeypatch):
     assert done.found is stage.first
     assert done.without is None
     assert done.beside_function
+    assert done.where == ("left by fit of asked",)
     assert done.again.kinds[0].probability == 0.8
     assert done.again.sensors == ("accel_x",)
     assert [one.probability for one in done.functions] == [0.8]

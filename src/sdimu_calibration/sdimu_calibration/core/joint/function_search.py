@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.joint.function_fit import with_function
-from sdimu_calibration.core.joint.leftovers import ATTITUDE, leftovers
+from sdimu_calibration.core.joint.leftovers import ATTITUDE, StopError, leftovers
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.set_fit import SetFit
@@ -31,6 +31,8 @@ class Searched:
     """What comes back of what is left without a function; None where nothing is left."""
     functions: tuple[FunctionShare, ...]
     """How probable a function is in all recordings, then in each alone; empty where none was weighed to the end."""
+    where: tuple[StopError, ...] = ()
+    """What is left in each stop without a function."""
 
     @property
     def beside_function(self) -> bool:
@@ -44,19 +46,20 @@ def searched(members: Sequence[Member], request: SetRequest, fitted: SetFit | No
     beside = found if found.after.function is not None else None
     if beside is not None and not beside.function_is_likely:
         found = search_without(beside, request)
-    again = recurrence(leftovers(found.alone, request.run))
+    left = leftovers(found.alone, request.run, found.before.names)
+    again = recurrence(left)
     if beside is None and again is not None:
         # Some recording may have an error that follows the attitude, or what is left may come back with it.
         returns = again.sensors if again.may_come_back(ATTITUDE) else ()
         fit = with_function(found.after, following(found.posterior, NAMED) or returns, request.run)
         beside = search_beside(found, fit, request) if fit.function else None
     if beside is None:
-        return Searched(found, None, again, ())
+        return Searched(found, None, again, (), left.where)
     functions = beside.functions if beside.stood else ()
     again = None if again is None else _judged(again, beside)
     if not beside.function_is_likely:
-        return Searched(found, None, again, functions)
-    return Searched(beside, None if beside is found else found, again, functions)
+        return Searched(found, None, again, functions, left.where)
+    return Searched(beside, None if beside is found else found, again, functions, left.where)
 
 
 def _judged(again: Recurrence, beside: SetSearch) -> Recurrence:

@@ -17,6 +17,7 @@ from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.joint.combine import stacked
 from sdimu_calibration.core.joint.member import Report
+from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import white_power_on
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, asked_again, power_on
 
@@ -35,8 +36,23 @@ _LEAST_HEAT = 0.3
 """Least temperature difference (K) that counts: thermometers are no better from day to day."""
 _MOST_COLUMNS = 1000
 """Number of leftovers at most: the time of a test goes with the cube, and six recordings show what twenty do."""
+_SEEN = 1e-12
+"""Ratio (1) of the information on an error in a dwell to the largest from which it counts: below is rounding."""
 _ALIKE = 0.5
 """Likeness (1) from which two dwells count as a pair: nearer to one place than to another."""
+
+
+@dataclass(frozen=True)
+class StopError:
+    """What a sensor has left in a stop of a recording: over its sigma, standard normal when the model is right."""
+
+    recording: str
+    channel: str
+    """One of `CHANNELS`."""
+    stop: int
+    before: float
+    after: float
+    """`before`, `after`: with the model as given, and with the effects that were found; NaN where nothing is seen."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +70,8 @@ class Leftovers:
     likeness: Mapping[str, Floats]
     """Shape (m, m). By kind: 1 where two leftovers are of one attitude (time, temperature), 0 where nothing is common.
     """
+    where: tuple[StopError, ...] = ()
+    """The same for people: each by itself."""
 
     def only(self, keep: Ints) -> Leftovers:
         """Return some of the leftovers.
@@ -96,7 +114,7 @@ class Leftovers:
         return max(shares)
 
 
-def leftovers(fit: SetFit, run: Run) -> Leftovers:
+def leftovers(fit: SetFit, run: Run, given: Sequence[str] = ()) -> Leftovers:
     """Ask the recordings of a set what is left in each of their dwells.
 
     Parameters
@@ -105,6 +123,8 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
         With everything that was found.
     run : callable
         Does the jobs.
+    given : sequence of str
+        Coefficients of the model as given.
     """
     reports = with_places(fit, run)
     fit = replace(fit, reports=tuple(reports))
@@ -117,10 +137,41 @@ def leftovers(fit: SetFit, run: Run) -> Leftovers:
         members += group
     every, P = stacked(rows), len(fit.names)
     W = np.hstack([every.A, _block_diagonal(own)])
-    d = W.T @ every.y
-    left = Information(W.T @ W, d).given(np.arange(P), fit.weight)
-    order = [k for k in members if reports[k].places is not None]
-    return _scaled(left.J[P:, P:], left.d[P:], [reports[k] for k in order], fit)
+    full = Information(W.T @ W, W.T @ every.y)
+    left = full.given(np.arange(P), fit.weight)
+    asked = [reports[k] for k in members if reports[k].places is not None]
+    found = _scaled(left.J[P:, P:], left.d[P:], asked, fit)
+    return replace(found, where=_where(asked, _as_given(full, fit, given), _deviates(left, P)))
+
+
+def _as_given(full: Information, fit: SetFit, given: Sequence[str]) -> Floats:
+    """Deviates (1) of all m leftovers, shape (m,), in the model as given: all recordings share its coefficients."""
+    P, p = len(fit.names), len(given)
+    T = np.zeros((len(full.d), len(full.d) - P + p))
+    weight = np.zeros(p)
+    for k, name in enumerate(fit.names):
+        base = split_tag(name)[0]
+        if base in given:
+            T[k, given.index(base)] = 1.0
+            weight[given.index(base)] = fit.weight[k]
+    T[P:, p:] = np.eye(len(full.d) - P)
+    return _deviates(Information(T.T @ full.J @ T, T.T @ full.d).given(np.arange(p), weight), p)
+
+
+def _deviates(left: Information, p: int) -> Floats:
+    """Errors in dwells over their sigmas (1), each by itself, shape (m,); the first p parameters are no such errors."""
+    J, d = np.diag(left.J)[p:], left.d[p:]
+    seen = np.max(J, initial=0.0) * _SEEN < J
+    return np.where(seen, d / np.sqrt(np.where(seen, J, 1.0)), np.nan)
+
+
+def _where(reports: Sequence[Report], before: Floats, after: Floats) -> tuple[StopError, ...]:
+    """Name the deviates (1) of leftovers, shape (m,): sensors of the first dwell of a recording, of its second ..."""
+    places = [(r.name, stop) for r in reports for stop, _, _ in r.times.stops]
+    named = [(name, channel, stop) for name, stop in places for channel in CHANNELS]
+    return tuple(
+        StopError(*at, one, other) for at, one, other in zip(named, before.tolist(), after.tolist(), strict=True)
+    )
 
 
 def with_places(fit: SetFit, run: Run) -> list[Report]:

@@ -21,6 +21,7 @@ from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.function_fit import unknown_functions
 from sdimu_calibration.core.joint.function_search import searched
+from sdimu_calibration.core.joint.leftovers import StopError
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
@@ -76,6 +77,8 @@ class SetDiagnosis:
     """The function of the attitude that explains what is left, at all stops; empty without one."""
     functions: tuple[FunctionShare, ...] = ()
     """How probable such a function is in all recordings, then in each alone; empty where none was looked for."""
+    where: tuple[StopError, ...] = ()
+    """What is left in each stop of the recordings, of many of some, without a function."""
 
     @property
     def function(self) -> float | None:
@@ -128,6 +131,7 @@ def diagnose_set(
         facts.told,
         unknown_functions(found.after) if facts.beside_function else (),
         done.functions,
+        done.where,
     )
 
 

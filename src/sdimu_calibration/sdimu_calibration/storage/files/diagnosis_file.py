@@ -326,6 +326,10 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         p_value=found.first.p_value,
         verdict=found.verdict,
         sentence=found.sentence,
+        where=[
+            entry(w, "recording channel stop normalised_mean=before normalised_mean_after=after")
+            for w in sorted(found.where, key=lambda w: -abs(np.nan_to_num(w.before)))
+        ],
         probabilities=odds(found.probabilities),
         candidates=[_of_set(f, found) for f in found.findings],
         unexplained={"is": is_unexplained, "fraction": float(is_unexplained), "best_variables": []},
