@@ -53,6 +53,9 @@ LONG = {
         "test_a_diagnosis_tells_what_it_tells_with_all_of_them",
         "test_what_is_kept_is_what_a_move_brings_near_the_best_model",
     ),
+    "test/sdimu_calibration/core/posterior/test_prior.py": (
+        "test_a_certain_effect_that_is_added_changes_no_probability_of_the_others",
+    ),
     "test/sdimu_calibration/core/posterior/test_models.py": (
         "test_probabilities_come_true_where_the_world_is_as_the_prior_says",
     ),

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.effects.selection import resolve
+from sdimu_calibration.core.diagnosis.diagnose import climb
+from sdimu_calibration.core.effects.selection import resolve, single_ones
 from sdimu_calibration.core.effects.usual import usual
+from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, prior_of
+from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_study.worlds import simulated_test
 
 LABELS = ("gyro_delay_y", "gyro_acceleration_sensitivity_yy", "gyro_acceleration_sensitivity_xy", "gyro_bias_wrap_yx")
 
@@ -43,3 +47,46 @@ def test_of_two_that_no_data_tell_apart_a_model_has_one(candidates):
     assert prior.log_more([0])[1] == -np.inf
     assert prior.log_of([0, 1]) == -np.inf
     assert np.isfinite(prior.log_of([0, 2]))
+
+
+def test_what_was_found_and_is_in_the_model_counts_as_what_is_found(candidates):
+    """The odds of the others are those beside it, kin included: to add it changes no probability of them."""
+    beside, own = prior_of(candidates), resolve(LABELS[2])
+    alone = prior_of([c for k, c in enumerate(candidates) if k != 2], found=(own,))
+    # Shares are of what is left; beside it they were of all.
+    less = np.log(1.0 - np.exp(beside.log_share[2]))
+    for more, same in (([0], [0]), ([1], [1]), ([3], [2]), ([0, 1, 3], [0, 1, 2])):
+        given = beside.log_of([2, *more]) - beside.log_of([2])
+        assert alone.log_of(same) == pytest.approx(given - less * len(same))
+        assert alone.log_more(same[:-1])[same[-1]] == pytest.approx(alone.log_of(same) - alone.log_of(same[:-1]))
+    assert alone.of(np.array([1, 2])).log_of([0]) == alone.log_of([1])
+
+
+def test_single_coefficients_were_found_and_whole_effects_are_habit():
+    effects = (
+        "gyro_bias",
+        "gyro_g_sensitivity",
+        "accel_quadratic_z",
+        "accel_triad_delay",
+        "gyro_bias_warm_up_y(tau=9 s)",
+    )
+    assert [e.labels for e in single_ones(effects)] == [
+        ("accel_quadratic_z",),
+        ("accel_triad_delay",),
+        ("gyro_bias_warm_up_y(tau=9 s)",),
+    ]
+    assert single_ones(load_model("baseline").effects) == single_ones(load_model("hand").effects) == ()
+
+
+def test_a_certain_effect_that_is_added_changes_no_probability_of_the_others():
+    """Beside K2 the drift had 83 %, and 70 % once K2 was in the model."""
+    hidden = ("accel_quadratic_z=25 ug/g^2", "gyro_bias_ramp_y=0.05 deg/h/h")
+    test, _ = simulated_test("dtg", load_imu("dtg"), "recommended", load_site("daejeon"), 11, hidden)
+    model = load_model("baseline")
+    found = climb(solve(test, model)).probabilities
+    added = climb(solve(test, with_effects(model, ["accel_quadratic_z"]))).probabilities
+    of = [{(f.family, f.sensor): f.probability for f in one.families} for one in (found, added)]
+    assert of[0].pop(("accel_quadratic", "accel_z")) > 0.99
+    for family in of[0].keys() & of[1].keys():
+        assert of[1][family] == pytest.approx(of[0][family], abs=0.02), family
+    assert max(of[1].values()) > 0.3

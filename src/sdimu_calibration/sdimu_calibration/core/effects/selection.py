@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
 
 from sdimu_calibration.core.effect_key import EffectKey, parse_key, read_options
@@ -21,6 +22,23 @@ def resolve(named: str | Effect) -> Effect:
     if key.options:
         effect = _with_options(effect, key)
     return effect.only(parameters) if parameters else effect
+
+
+def single_ones(effects: Iterable[str | Effect]) -> tuple[Effect, ...]:
+    """Effects of a model that somebody added because they were found: of a catalogue's effect some coefficients alone.
+
+    A whole effect of several coefficients is there by habit, and says nothing of the sensor.
+    """
+    every = map(resolve, effects)
+    return tuple(e for e in every if _is_single(e))
+
+
+def _is_single(effect: Effect) -> bool:
+    family = effect.family or effect.name
+    if family not in registry.names():
+        return False
+    whole = len(registry.get(family).parameters)
+    return whole == 1 or len(effect.parameters) < whole
 
 
 def refuse_size(key: EffectKey) -> None:

@@ -122,7 +122,8 @@ class HandheldFit(Fit):
 
     def evidence(self, effects: Sequence[Effect] = ()) -> HandheldEvidence:
         """Residuals of rests and turns about this fit, and the signatures of its parameters and those of `effects`."""
-        return handheld_evidence(self.ready.run, self.priors, self.solution.point, effects, self.test.imu)
+        point = self.solution.point
+        return handheld_evidence(self.ready.run, self.priors, point, effects, self.test.imu, self.found)
 
     def rows(self) -> RunRows:
         """Equations about this fit, for recordings that learn their scatter together."""

@@ -353,7 +353,7 @@ class NavigationFit(Fit):
 
     def evidence(self, effects: Sequence[Effect] = ()) -> NavigationEvidence:
         """Whitened innovations about this fit and the signatures of its parameters and those of `effects`."""
-        return navigation_evidence(self.prepared, self.setup, self.known, self.estimate, effects)
+        return navigation_evidence(self.prepared, self.setup, self.known, self.estimate, effects, self.found)
 
     def consistency(self, evidence: LinearEvidence | None = None) -> Consistency:
         """Check noise and innovations; say where the model fails."""

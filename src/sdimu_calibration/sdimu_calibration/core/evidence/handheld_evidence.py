@@ -64,7 +64,12 @@ class HandheldEvidence(LinearEvidence):
 
 
 def handheld_evidence(
-    run: HandheldRun, scene: FitPriors, point: LinearisationPoint, effects: Sequence[Effect], imu: ImuSpecification
+    run: HandheldRun,
+    scene: FitPriors,
+    point: LinearisationPoint,
+    effects: Sequence[Effect],
+    imu: ImuSpecification,
+    found: tuple[Effect, ...] = (),
 ) -> HandheldEvidence:
     """Linearise about a finished fit.
 
@@ -76,6 +81,8 @@ def handheld_evidence(
         Each of their parameters becomes a candidate.
     imu : ImuSpecification
         Gives candidates their prior.
+    found : tuple of Effect
+        As of `LinearEvidence`.
     """
     k, q = len(run.t), len(scene.kept)
     rows, residual = equations(run, scene, point)
@@ -99,6 +106,7 @@ def handheld_evidence(
         imu=imu,
         times=timetable(run),
         coefficients=q - scene.model.serving,
+        found=found,
         channel=np.concatenate(
             [np.tile(np.arange(6), k), np.tile(np.arange(6, 9), k - 1), np.full(len(run.whole), _DOWN)]
         ),

@@ -67,6 +67,8 @@ class LinearEvidence(ABC):
     """How many of the model's parameters, the first ones, are sensor coefficients."""
     noise: InStops | None = field(default=None, kw_only=True)
     """Signatures of the modes of noise with a memory, N rows and r columns; None without any."""
+    found: tuple[Effect, ...] = field(default=(), kw_only=True)
+    """Effects of the model that were found, as of `single_ones`: a sensor that has some is likelier to have more."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
     """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)
@@ -282,6 +284,7 @@ class LinearEvidence(ABC):
             candidates=self.candidates,
             prior=self.prior,
             coefficients=self.coefficients,
+            found=self.found,
             worked_out=Information(self.information.J, d),
         )
 
@@ -316,7 +319,14 @@ class LinearEvidence(ABC):
             candidates=(*tried, *self.candidates),
             prior=np.concatenate([prior, self.prior]),
             coefficients=self.coefficients - len(columns),
+            found=_without(self.found, tried),
         )
+
+
+def _without(found: Sequence[Effect], tried: Sequence[Candidate]) -> tuple[Effect, ...]:
+    """Leave out of effects those that are candidates."""
+    labels = {label for one in tried for label in one.effect.labels}
+    return tuple(effect for effect in found if labels.isdisjoint(effect.labels))
 
 
 def candidate_priors(effects: Sequence[Effect], imu: ImuSpecification) -> tuple[tuple[Candidate, ...], Floats]:

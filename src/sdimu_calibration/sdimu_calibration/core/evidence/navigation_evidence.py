@@ -136,7 +136,12 @@ def _with_known_coefficients(start: PassState, p: int) -> PassState:
 
 
 def navigation_evidence(
-    prepared: PreparedData, setup: TestSetup, known: KnownPass, estimate: Floats, effects: Sequence[Effect]
+    prepared: PreparedData,
+    setup: TestSetup,
+    known: KnownPass,
+    estimate: Floats,
+    effects: Sequence[Effect],
+    found: tuple[Effect, ...] = (),
 ) -> NavigationEvidence:
     """Put whitened innovations and signatures together.
 
@@ -146,6 +151,8 @@ def navigation_evidence(
         Coefficients of the model (SI), at which `known` ran; it ran without those that fade.
     effects : sequence of Effect
         Each of their parameters becomes a candidate.
+    found : tuple of Effect
+        As of `LinearEvidence`.
     """
     sensors, latitude = setup.sensors, setup.site.latitude_rad
     epoch, channel = measured_rows(known.output)
@@ -163,6 +170,7 @@ def navigation_evidence(
         imu=setup.imu,
         times=timetable(prepared),
         coefficients=len(sensors.prior) - sensors.serving,
+        found=found,
         epoch=epoch,
         channel=channel,
         known=known,

@@ -142,7 +142,9 @@ class SetBoard(Board[SetEvidence]):
         first = len(self.evidence.weight)
         at = self.testable.tolist()
         return prior_of(
-            [self.evidence.candidates[k - first] for k in at], [i for i, k in enumerate(at) if k in self.finer]
+            [self.evidence.candidates[k - first] for k in at],
+            [i for i, k in enumerate(at) if k in self.finer],
+            found=self.evidence.found,
         )
 
     @cached_property

@@ -152,7 +152,9 @@ class Board(Generic[E]):
         first = len(self.evidence.weight)
         candidates = [self.evidence.candidates[k - first] for k in self.use.tolist()]
         J = self.evidence.information.given(self.evidence.model, self.evidence.weight).J[np.ix_(self.use, self.use)]
-        return prior_of(candidates, [i for i, k in enumerate(self.use.tolist()) if k in self.finer], J)
+        return prior_of(
+            candidates, [i for i, k in enumerate(self.use.tolist()) if k in self.finer], J, self.evidence.found
+        )
 
     @cached_property
     def size(self) -> Floats:

@@ -145,4 +145,8 @@ def _prior(board: Board[E], candidates: Sequence[Candidate]) -> Prior:
     """Prior of all candidates of a board, then of more."""
     columns = board.use.tolist()
     every = [board.evidence.candidate(column) for column in columns]
-    return prior_of([*every, *candidates], [place for place, column in enumerate(columns) if column in board.finer])
+    return prior_of(
+        [*every, *candidates],
+        [place for place, column in enumerate(columns) if column in board.finer],
+        found=board.evidence.found,
+    )

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.effects.effect import OF_ONE_TIME
+from sdimu_calibration.core.effects.effect import OF_ONE_TIME, Effect
 from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.posterior.neighbours import odds_beside
@@ -69,6 +69,8 @@ class Prior:
     """Shape (q,). Sensor axis whose bias a candidate lets drift, in all recordings or in one; -1 of all others."""
     twin: Ints
     """Shape (q,). Candidates that no data of this plan tell apart share a number: a model has one of them."""
+    found: int = 0
+    """Number of effects that the model as given has because they were found: they count with those of a model."""
 
     def of(self, places: Ints) -> Prior:
         """Prior of some of the candidates, as unlikely as they are among all of them.
@@ -86,6 +88,7 @@ class Prior:
             self.own[places],
             self.drift[places],
             self.twin[places],
+            self.found,
         )
 
     @cached_property
@@ -131,8 +134,8 @@ class Prior:
         return variants | np.isin(self.twin, self.twin[at])
 
     def named(self, base: Sequence[int]) -> int:
-        """Count the candidates of a model that are no equations."""
-        return int(np.count_nonzero(~self.own[np.asarray(base, dtype=np.int64)]))
+        """Count the effects that are no equations: candidates of a model, and those of the model as given."""
+        return self.found + int(np.count_nonzero(~self.own[np.asarray(base, dtype=np.int64)]))
 
     def log_more(self, base: Sequence[int]) -> Floats:
         """Log odds of each candidate beside those of a model.
@@ -198,12 +201,14 @@ class Prior:
         if not all(distinct) or drifts.max(initial=0) > MOST_DRIFTS:
             return -np.inf
         kin = count - len(set(self.cause[at].tolist()))
-        number = float(np.log(np.arange(1.0, self.named(at.tolist()) + 1.0)).sum())
+        number = float(np.log(np.arange(self.found + 1.0, self.named(at.tolist()) + 1.0)).sum())
         number -= count * float(np.log1p(1.0 / MEAN_NUMBER))
         return float(self.log_share[at].sum()) + number + KIN * kin
 
 
-def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Floats | None = None) -> Prior:
+def prior_of(
+    candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Floats | None = None, found: Sequence[Effect] = ()
+) -> Prior:
     """State the prior of candidates.
 
     Parameters
@@ -214,6 +219,8 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Flo
         lower those of the others.
     J : ndarray, shape (q, q), optional
         Information on the candidates, the coefficients taken out, in any units: tells which are twins.
+    found : sequence of Effect
+        Effects of the model as given that were found: the odds are those beside them.
     """
     names = [c.coefficient for c in candidates]
     made = set(shared)
@@ -221,16 +228,21 @@ def prior_of(candidates: Sequence[Candidate], shared: Sequence[int] = (), J: Flo
     weight = np.array([_odds(c) / max(count[name], 1) for c, name in zip(candidates, names, strict=True)])
     total = float(sum(w for k, w in enumerate(weight.tolist()) if k not in made and candidates[k].family != "own"))
     causes = [(c.label,) if c.family == "own" else tuple(c.effect.options.values()) for c in candidates]
+    # What has a cause that the model has is kin of that, and not once more of others of this cause.
+    have = {("", one.family or one.name, *one.options.values()) for one in found}
+    keys = [(c.recording, c.family, *cause) for c, cause in zip(candidates, causes, strict=True)]
+    kin = np.array([key in have for key in keys], dtype=bool)
     axes = _numbers([(c.recording, str(c.effect.terms[0].channel)) for c in candidates])
     return Prior(
-        np.log(weight / max(total, 1e-300)),
-        _numbers([(c.recording, c.family, *cause) for c, cause in zip(candidates, causes, strict=True)]),
+        np.log(weight / max(total, 1e-300)) + KIN * kin,
+        _numbers([(*key, str(k)) if kin[k] else key for k, key in enumerate(keys)]),
         _numbers([(name,) for name in names]),
         np.array([bool(OF_ONE_TIME & c.effect.options.keys()) for c in candidates], dtype=bool),
         np.array([c.effect.positive for c in candidates], dtype=bool),
         np.array([c.family == "own" for c in candidates], dtype=bool),
         np.where([c.effect.bias_drift for c in candidates], axes, -1).astype(np.int64),
         np.arange(len(names)) if J is None else twins(J),
+        sum(len(one.parameters) for one in found),
     )
 
 
