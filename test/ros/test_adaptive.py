@@ -86,3 +86,27 @@ def test_a_test_that_ends_without_its_limits_says_so_with_its_exit_status(tmp_pa
     assert process.returncode == 3
     assert "were not reached" in err
     assert last["text"] in err
+
+
+def test_what_was_found_for_sure_is_in_the_result_whose_limits_hold(tmp_path):
+    """Else the result has the limits of no model: its noise takes in what was found, and its sigmas are larger."""
+    goals = tmp_path / "coarse.yaml"
+    goals.write_text(GOALS, encoding="utf-8")
+    effect = ("--effect", "accel_quadratic_z=400 ug/g^2")
+    out = tmp_path / "run"
+    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--seed", 8, *effect, "--out", out)
+    try:
+        told, err = process.communicate(timeout=DEADLINE_S)
+    finally:
+        process.kill()
+    last = read_json(out / "choices.json", "sdimu-choices/1")["choices"][-1]
+    assert last["reached"], told
+    assert last["decided"] == ["accel_quadratic_z"]
+    live = read_result(out / "result.json")
+    assert "accel_quadratic_z" in live.names, err
+    limited, limit = load_goals(goals).of(live.names, live.body_frame)
+    assert (np.sqrt(np.diag(live.covariance))[limited] <= limit).all()
+    found = read_json(out / "diagnosis.json", "sdimu-diagnosis/1")
+    # The diagnosis is of the model that the result has.
+    assert "accel_quadratic_z" in found["fit"]["before"]["model"]
+    assert "accel_quadratic_z" not in {one["label"] for one in found["candidates"]}

@@ -81,6 +81,14 @@ def test_the_verdict_stands_first(text, diagnosis):
     assert prose(diagnosis.sentence) in body
 
 
+def test_a_page_with_the_coefficients_of_the_model_as_given_calls_them_no_means(text, diagnosis):
+    means = "are means over these models"
+    assert means in text
+    of_run = page(diagnosis.before, Contents("x", summary=summarise(diagnosis)))
+    assert means not in of_run
+    assert "The table of coefficients is of one model" in of_run
+
+
 def test_the_contents_name_every_card_of_the_page_in_its_order(text):
     links = re.findall(r'<li><a href="#([\w-]+)">(.*?)</a>', text)
     cards = re.findall(r'<section class="card" id="([\w-]+)"><h2>(.*?)</h2>', text)

@@ -21,6 +21,7 @@ from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.storage.files import effect_file
 from sdimu_calibration.storage.files.config import load_imu, load_model
 from sdimu_calibration.storage.files.effect_file import (
+    added_to,
     effects_of_result,
     extended_model,
     find_effects,
@@ -161,6 +162,12 @@ def test_an_absent_file_is_told_by_its_name(tmp_path):
 def test_adding_what_a_model_has_is_refused(model, added):
     with pytest.raises(DataError, match=re.escape(f"'{added[-1]}' is in the model already")):
         extended_model(model, added)
+
+
+def test_what_came_to_a_model_is_told_by_its_names():
+    result = (*load_model("baseline").effects, "accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)", "of my own")
+    assert added_to("baseline", result) == ["accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)"]
+    assert added_to("baseline", load_model("baseline").effects) == []
 
 
 def test_what_a_model_has_is_not_added_twice():

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from sdimu_calibration.core.adaptive.question import Decision, Situation, next_m
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.table import Step
+from sdimu_calibration.nodes.adding import ask_to_add
 from sdimu_calibration.nodes.credits import HISTORY, NS, header
 from sdimu_calibration.nodes.diagnosis_worker import Answer, WorkerRequest, WorkerSetup
 from sdimu_calibration.nodes.driving import PATIENCE_S, Driving
@@ -78,6 +80,7 @@ class AdaptiveNode:
         self._stop, self._begin_ns, self._end_ns = 0, 0, 0
         self._look_at, self._arrived, self._tries = 0.0, 0.0, 0
         self._made: list[dict[str, object]] = []
+        self._adding: Iterator[str | None] | None = None
 
     def close(self) -> None:
         """Leave no table in motion and no process behind."""
@@ -87,6 +90,9 @@ class AdaptiveNode:
             self._worker.close()
 
     def _act(self, angles: Floats) -> None:
+        if self._adding is not None:
+            self._add()
+            return
         if self._next is None:
             self._look(tuple(angles.tolist()))
             return
@@ -145,8 +151,23 @@ class AdaptiveNode:
         self._made.append(asdict(decision))
         write_json(self._out / CHOICES, {"format": FORMAT, "goals": self._goals.name, "choices": self._made})
         self._last, self._next, self._why = decision, decision.step, decision.reason
-        if decision.step is None:
+        if decision.step is not None:
+            return
+        if decision.reached and decision.decided:
+            # The limits hold beside what was found: so the result has it.
+            self._adding = ask_to_add(self.node, decision.decided)
+        else:
             self._driving.end()
+
+    def _add(self) -> None:
+        """Wait for what is found to come into the model, then end."""
+        answer = next(self._adding, "") if self._adding else ""
+        if answer is None:
+            return
+        if answer:
+            self.node.get_logger().warning(f"the result lacks {', '.join(self._last.decided)}: {answer}")
+        self._adding = None
+        self._driving.end()
 
     def _publish(self, decision: Decision) -> None:
         words = "" if decision.step is None else decision.step.words

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from sdimu_calibration.nodes.adding import ANSWER_S, ask_to_add
 from sdimu_calibration.nodes.credits import HISTORY, LATCHED, NS, to_ns
 from sdimu_calibration.nodes.diagnosis_messages import seen_diagnosis, seen_heat_map
 from sdimu_calibration.report.live_seen import Progress
 from sdimu_calibration.report.live_text import SeenChoice
 from sdimu_calibration.storage.bags.status_message import first_entry, phase_entry, stamp_ns
 
-ANSWER_S = 20.0
-"""Wall time in which a node answers (s): one that fits a block of samples answers after it."""
 # Watching must never hold up what is watched.
 GLANCE = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -69,32 +65,15 @@ class Monitor:
         return self.progress.heard and not any(self._node.count_publishers(topic) for topic in topics)
 
     def add(self, effects: Sequence[str], seconds: float = ANSWER_S) -> str:
-        """Let the calibration node take effects into the model, beside those that were added before.
+        """Let the calibration node take effects into the model; why it did not, empty when it did.
 
-        `effects`: names, equations or files; `seconds`: wall time in which the node must answer. Gives why it did not;
-        empty when it did.
+        As `ask_to_add`.
         """
-        client = AsyncParameterClient(self._node, "calibration")
-        if not self._answered(client.services_are_ready, seconds):
-            return "no calibration node answers in this domain"
-        known = client.get_parameters(["add"])
-        if not self._answered(known.done, seconds):
-            return "the calibration node does not answer"
-        before = [text for text in known.result().values[0].string_array_value if text]
-        value = Parameter("add", Parameter.Type.STRING_ARRAY, list(dict.fromkeys([*before, *effects])))
-        answer = client.set_parameters([value])
-        if not self._answered(answer.done, seconds):
-            return "the calibration node does not answer"
-        response = answer.result().results[0]
-        return "" if response.successful else str(response.reason)
-
-    def _answered(self, done: Callable[[], bool], seconds: float) -> bool:
-        begun = time.monotonic()
-        while not done():
-            if time.monotonic() - begun > seconds:
-                return False
+        for answer in ask_to_add(self._node, effects, seconds):
+            if answer is not None:
+                return answer
             self.listen(0.05)
-        return True
+        return ""
 
     def close(self) -> None:
         """Leave the domain."""

@@ -21,6 +21,8 @@ _LEAST = 0.05
 """Probability (1) from which a family or a noise has a line of its own: less is one of many."""
 _MOST = 12
 """Number of families at most, and of members of one: the file has them all."""
+_MEANS = "Coefficients and sigmas of this page are means over these models."
+_AS_GIVEN = "The table of coefficients is of one model; a diagnosis of the bag gives means over these models."
 _HEAD = ("", "probability", "", "size if it is this")
 
 
@@ -29,11 +31,13 @@ def odds_section(
     where: str = "in this test",
     found: Mapping[str, str] | None = None,
     functions: Sequence[tuple[str, float]] = (),
+    means: bool = True,
 ) -> str:
     """Return the section; empty where there are no probabilities.
 
     `where`: what the data are of, as it ends a sentence; `found`: sizes in words of what the page tells as found, by
-    label: a size stands on a page once; `functions`: of unknown functions, in words, with their probability.
+    label: a size stands on a page once; `functions`: of unknown functions, in words, with their probability; `means`:
+    the coefficients of the page are means over the models.
     """
     sizes = found or {}
     if told is None:
@@ -61,7 +65,7 @@ def odds_section(
         quiet(
             f"{rest}Summed over all models that the data leave probable {where}, weighed with how usual each is. "
             f"Of a family, each member is listed; several effects may be missing at once. "
-            "Coefficients and sigmas of this page are means over these models."
+            f"{_MEANS if means else _AS_GIVEN}"
         ),
     )
 

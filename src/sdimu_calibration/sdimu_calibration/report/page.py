@@ -123,7 +123,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         unknown_section(of_set.unknown, draw) if of_set is not None else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
-        *([] if summary is None else _evidence(summary, more, spell, draw)),
+        *([] if summary is None else _evidence(summary, more, _means(calibration, summary), spell, draw)),
         rests_section(calibration.rests) if calibration.rests else "",
         noise_section(fit, draw) if isinstance(fit, NavigationFit) else "",
         experiment.data_section(fit, draw) if fit is not None else "",
@@ -161,16 +161,24 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
     return () if summary is None else tuple(n for n in summary.diagnosis.after.names if n not in calibration.names)
 
 
-def _evidence(summary: DiagnosisSummary, more: ReportExtras, spell: Spell | None, draw: Draw) -> list[str]:
-    """Tell what is missing, what it would be confused with, what it does in use, and where it shows."""
+def _means(calibration: Calibration, summary: DiagnosisSummary) -> bool:
+    """Whether the coefficients of the page are those of the diagnosis, and not of a model as it was given."""
+    return calibration.names == summary.diagnosis.after.names
+
+
+def _evidence(summary: DiagnosisSummary, more: ReportExtras, means: bool, spell: Spell | None, draw: Draw) -> list[str]:
+    """Tell what is missing, what it would be confused with, what it does in use, and where it shows.
+
+    `means`: as for `odds_section`.
+    """
     diagnosis = summary.diagnosis
     found = {one.candidate.label: size_of(one).replace("+-", "\N{PLUS-MINUS SIGN}") for one in summary.found}
     if diagnosis.fit.learns_scatter:
-        odds = odds_section(diagnosis.probabilities, "in this run", found=found)
+        odds = odds_section(diagnosis.probabilities, "in this run", found=found, means=means)
         return [odds, *handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]
     candidates, residuals = data.scored(diagnosis), data.residuals(diagnosis)
     return [
-        odds_section(diagnosis.probabilities, found=found),
+        odds_section(diagnosis.probabilities, found=found, means=means),
         unknown_section(unknown_of(diagnosis), draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),

@@ -340,7 +340,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
-    from sdimu_calibration.storage.files.effect_file import extended_model
+    from sdimu_calibration.storage.files.effect_file import added_to, extended_model
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
     from sdimu_calibration.storage.opening import open_test
@@ -351,10 +351,13 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         opened = open_test(out / "bag", site, load_imu(imu))
-        fit = solve(opened, extended_model(model, ()))
+        added = added_to(model, result.model)
+        fit = solve(opened, extended_model(model, added))
         diagnosis = climb(fit)
         summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
-    asked = Asked.of((out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model))
+    asked = Asked.of(
+        (out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model, add=added or None)
+    )
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary, in_use=in_use_entry(more))
         _write_plan(part, out, test, summary)

@@ -52,6 +52,8 @@ class Knowledge:
     named: tuple[str, ...]
     """Labels of everything that was found."""
     verdict: Verdict
+    decided: tuple[str, ...] = ()
+    """Of `named` those of a family that is sure to be missing, each by itself."""
 
 
 def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
@@ -59,6 +61,8 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     alike, sizes, needed, place = _class(found)
     named = tuple(c.label for c in found.chosen)
     known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
+    sure = tuple(one.candidate.label for one in found.found_effects if one.decided and not one.alike)
+    known = replace(known, decided=sure)
     if not alike:
         return replace(known, verdict=found.verdict)
     count = known.at.own

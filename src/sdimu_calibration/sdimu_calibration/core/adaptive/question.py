@@ -56,6 +56,8 @@ class Decision:
     named: tuple[str, ...]
     alike: tuple[str, ...]
     """`named`, `alike`: effects that were found, and what the first open class holds besides."""
+    decided: tuple[str, ...] = ()
+    """Of `named` those of which it is sure that they are missing: the result of the test has them."""
 
 
 def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:
@@ -73,7 +75,7 @@ def next_move(fit: Fit, diagnosis: LiveDiagnosis, about: Situation) -> Decision:
         known = knowledge(climb(fit), about.goals)
         chosen = _choose(known, about, left)
     alike = () if known.open is None else known.open.alike
-    facts = (about.elapsed_s, float(known.ratio.max()), known.named, alike)
+    facts = (about.elapsed_s, float(known.ratio.max()), known.named, alike, known.decided)
     if isinstance(chosen, End):
         return Decision(None, f"the test ends: {chosen.reason}", chosen.reason, chosen.reached, *facts)
     return Decision(chosen.step, chosen.text, chosen.reason, False, *facts)

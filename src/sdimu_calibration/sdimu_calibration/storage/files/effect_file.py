@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -173,6 +174,16 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
         effects += new_parts(find_effects(text), effects, text)
     # A model names its effects; `imu_model.build` takes an effect itself as well.
     return replace(model, effects=cast("tuple[str, ...]", tuple(effects)))
+
+
+def added_to(name: str, effects: Sequence[str]) -> list[str]:
+    """Effects of the catalogue in the model of a result that came to those it began with. `name`: that model."""
+    begun = {label for effect in extended_model(name, ()).effects for label in selection.resolve(effect).labels}
+    added = []
+    for effect in effects:
+        with suppress(DataError):
+            added += [] if begun.issuperset(selection.resolve(effect).labels) else [effect]
+    return added
 
 
 def _beside(folder: Path, text: str) -> str:
