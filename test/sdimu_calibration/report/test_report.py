@@ -188,8 +188,12 @@ def test_the_ladder_of_refits_tells_every_rung(diagnosis):
         Rung("other_effect", False, "does not lower it", 21.0, 1.0, 1.01, 0.99, 1.0, 0.001, ()),
     )
     text = page(diagnosis.after, Contents("x", summary=summarise(replace(diagnosis, rungs=rungs))))
-    for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "refused: does not lower it"):
+    for word in ("+ some_effect", "+30.0", "gyro_bias_x +7.1", "held-out RMS falls"):
         assert word in text
+    # Whether the error falls is told of each, and nothing is called accepted: of a class it is open which it is.
+    told = [re.findall(r"<td[^>]*>(yes|no)</td>", line) for line in text.split("<tr>") if "_effect</td>" in line]
+    assert [one for one in told if one] == [["yes"], ["no"]]
+    assert "accepted" not in text
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,7 @@ _REFITS = (
     "NIS",
     "held-out RMS",
     "velocity after turns",
-    "verdict",
+    "held-out RMS falls",
     "moved most (sigma)",
 )
 
@@ -124,7 +124,7 @@ def _refit(r: Rung) -> list[str]:
         f"{r.nis_mean:.3f}",
         f"{r.held_out_rms:.3f}",
         f"{r.jump:.2f} sigma, {1e3 * r.jump_velocity:.2f} mm/s",
-        "accepted" if r.accepted else f"refused: {r.reason}",
+        ("yes" if r.accepted else "no") if r.added else "",
         moved,
     ]
 
