@@ -101,11 +101,6 @@ LONG = {
         "test_errors_of_the_batch_are_as_large_as_it_says",
         "test_a_wrong_azimuth_at_the_start_changes_nothing_at_the_end",
     ),
-    "test/sdimu_calibration/core/batch/test_classical.py": (
-        "test_an_encoder_that_counts_to_half_a_turn_is_followed_over_it",
-        "test_angles_that_do_not_explain_the_samples_are_told",
-        "test_without_mount_the_errors_are_those_of_the_noise",
-    ),
     "test/sdimu_calibration/core/data/test_latitude_check.py": (
         "test_the_right_place_is_never_contradicted",
         "test_the_vertical_rate_of_the_earth_is_right_within_its_sigma",
@@ -347,7 +342,6 @@ row is the whole file."""
 
 VARIANTS = {
     "test/sdimu_calibration/core/batch/test_batch.py": ("test_responses_of_a_motion_are_its_derivatives[0.0]",),
-    "test/sdimu_calibration/core/batch/test_classical.py": ("test_a_mount_passes_for_misalignment_and_scale[1.0]",),
     "test/sdimu_calibration/core/estimation/test_axes_by_temperature.py": (
         "test_a_ramp_gives_the_axes_of_every_temperature[mems_industrial-filter]",
     ),

@@ -1,4 +1,4 @@
-"""Error against mount misalignment, for the filter and for the classical estimator: the paper's claim, measured.
+"""Error against mount misalignment, for the filter and for the classical calibration: the paper's claim, measured.
 
 Every seed draws one IMU and one noise; the same IMU is then tested at every mount.
 """
@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.batch.classical import TABLE_FRAME
-from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
@@ -28,6 +26,7 @@ from sdimu_calibration.report.groups import title
 from sdimu_calibration.storage.files.whole_file import write_whole
 from sdimu_sim.core.scenario import Scenario, generate
 from sdimu_sim.core.truth import Truth, in_body_frame
+from sdimu_study.classical import TABLE_FRAME, ClassicalResult, calibrate_classically
 from sdimu_study.study import Study, Table
 
 FORMAT = "sdimu-mount-study/1"
@@ -60,16 +59,16 @@ def world(case: Mounted, seed: int) -> MountWorld:
     return MountWorld(case, *generate(replace(case.scenario, seed=seed, mount_rad=(angle, angle, angle))))
 
 
-def run(world: MountWorld) -> dict[str, Calibration]:
+def run(world: MountWorld) -> dict[str, Calibration | ClassicalResult]:
     """Calibrate by each of `ESTIMATORS`."""
     scenario, model = world.case.scenario, world.case.model
     what = world.recording, scenario.site, scenario.imu, model
     found = calibrate(*what, held_out=False)
-    classical = calibrate(*what, held_out=False, estimator="classical")
-    return dict(zip(ESTIMATORS, (found, classical, turned(classical, model.body_frame)), strict=True))
+    classical = calibrate_classically(*what)
+    return dict(zip(ESTIMATORS, (found, classical, classical.turned(model.body_frame)), strict=True))
 
 
-def score(world: MountWorld, found: Mapping[str, Calibration]) -> dict[str, Any]:
+def score(world: MountWorld, found: Mapping[str, Calibration | ClassicalResult]) -> dict[str, Any]:
     """Mean square errors (SI) by estimator and effect."""
     return {
         estimator: {effect: float(np.mean(e**2)) for effect, e in errors_by_effect(result, world.truth).items()}
@@ -78,13 +77,6 @@ def score(world: MountWorld, found: Mapping[str, Calibration]) -> dict[str, Any]
 
 
 STUDY = Study("mount", world, run, score)
-
-
-def turned(result: Calibration, frame: str) -> Calibration:
-    """Turn a result in the axes of the table into another body frame, exactly."""
-    J = body_frame.jacobian_at(result.names, result.values, frame)
-    values = body_frame.values_in_frame(result.names, result.values, frame)
-    return replace(result, body_frame=frame, values=values, covariance=J @ result.covariance @ J.T)
 
 
 def mount_study(
@@ -138,7 +130,7 @@ def _by_mount(rows: Sequence[Mapping[str, Any]], estimator: str, effect: str, mo
     return np.ascontiguousarray(np.array([row[estimator][effect] for row in rows]).reshape(-1, mounts).T)
 
 
-def errors_by_effect(result: Calibration, truth: Truth) -> dict[str, Floats]:
+def errors_by_effect(result: Calibration | ClassicalResult, truth: Truth) -> dict[str, Floats]:
     """Estimate minus truth (SI) by effect; coefficients that the frame makes zero are left out.
 
     The classical result in table axes is held against the sensor as built, in its own axes: that these are the
@@ -212,7 +204,7 @@ def write_page(path: Path, content: Mapping[str, Any], units: Mapping[str, str])
     drawn = html(figure(content, units), 1)
     text = (
         f"{len(content['seeds'])} IMUs, each tested at every mount (the same angle about all axes). RMS over IMUs "
-        "and axes; bars: its standard error. The classical estimator takes table axes for IMU axes. Turned into the "
+        "and axes; bars: its standard error. The classical calibration takes table axes for IMU axes. Turned into the "
         "accelerometers' own frame afterwards it loses most of the mount again: on a table whose angles are perfect."
     )
     heading = "Error against mount misalignment"

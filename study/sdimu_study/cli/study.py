@@ -115,7 +115,7 @@ def mount(
     model: Wanted = "baseline",
     site: Place = "daejeon",
 ) -> None:
-    """Draw error against mount misalignment for the filter and the classical estimator."""
+    """Draw error against mount misalignment for the filter and the classical calibration."""
     from sdimu_calibration.cli.progress import bar
     from sdimu_calibration.core.effects.imu_model import build
     from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site

@@ -132,6 +132,12 @@ def test_by_hand_is_the_estimator_of_a_run_by_hand(estimator, asked):
     assert Fitted(estimator=estimator, hand=True).asked_estimator == asked
 
 
+@pytest.mark.parametrize("estimator", ["classical", "nosuch"])
+def test_an_unknown_estimator_is_refused_with_those_that_there_are(estimator):
+    with pytest.raises(DataError, match=f"^--estimator {estimator}: expected one of auto, filter, handheld, batch$"):
+        _ = Fitted(estimator=estimator).asked_estimator
+
+
 @pytest.mark.parametrize("estimator", ["filter", "second-order", "batch"])
 def test_by_hand_excludes_the_estimators_of_a_table(estimator):
     with pytest.raises(typer.BadParameter, match="leave out one of both"):

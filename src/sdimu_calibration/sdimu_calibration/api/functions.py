@@ -184,7 +184,7 @@ def calibrate(
     add : sequence of str
         Effects to add, as for `sdimu calibrate --add`.
     estimator : str
-        ``auto``, ``filter``, ``handheld`` (or ``hand``), ``batch`` or ``classical``.
+        ``auto``, ``filter``, ``handheld`` (or ``hand``) or ``batch``.
     progress : callable
         Called with a word and the fraction done.
     """

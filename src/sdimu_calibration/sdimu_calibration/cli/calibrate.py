@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -42,7 +42,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     Exit status 3: done, but the estimate is not to be trusted; stderr says why.
     """
     from sdimu_calibration.core.estimation.outcome import outcome
-    from sdimu_calibration.core.estimation.solve import AUTO, solve
+    from sdimu_calibration.core.estimation.solve import solve
     from sdimu_calibration.core.site_reference import relative_line
     from sdimu_calibration.report.page import write_report
     from sdimu_calibration.report.table import rich_table, rows
@@ -52,12 +52,6 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
 
     console, truth = plain(stderr=request.as_json), request.truth
     printed = printing(console, request.pdf)
-    if truth is not None and request.estimator == "classical":
-        raise typer.BadParameter(
-            "the classical estimator answers in the axes of the table, and no truth is known in them: leave --truth "
-            "out, or see sdimu study mount",
-            param_hint="--truth",
-        )
     one = the_only(bags, opening, request)
     if isinstance(one, SetRequest):
         refuse_for_sets(opening, truth=truth)
@@ -95,8 +89,7 @@ def calibrate(bags: BagsArgument = None, *, request: CalibrationRequest, opening
     tell(console, (*((at,) if at else ()), *notes, *(note for note in result.notes if note not in notes)))
     misfit = any(topic_of(note) in MISFITS for note in result.notes)
     say(console, TO_LEARN if misfit else NOT_LOOKED_FOR)
-    able = request if fit.diagnosable else replace(request, estimator=AUTO)
-    command(console, Asked.of((bag,), folder, opening, able).command("diagnose"))
+    command(console, about.command("diagnose"))
     say(console, f"results in {folder}")
     answer(folder / "result.json", request.as_json)
     leave(result)

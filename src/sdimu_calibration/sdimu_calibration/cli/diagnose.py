@@ -56,7 +56,7 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     """
     from sdimu_calibration.cli.diagnosis_text import notes_of_diagnosis, print_summary
     from sdimu_calibration.core.diagnosis.bootstrap import bootstrap as repeat_on_noise
-    from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, climb
+    from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.plan_seen import as_plan
     from sdimu_calibration.core.diagnosis.summary import summarise
     from sdimu_calibration.core.estimation.solve import solve
@@ -68,8 +68,6 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
 
     console, asked = plain(stderr=request.as_json), request.asked_estimator
     printed = printing(console, request.pdf)
-    if asked == "classical":
-        raise DataError(NOT_DIAGNOSABLE)
     if request.bootstrap and asked == HANDHELD:
         raise DataError(NO_BOOTSTRAP)
     extra = [effect for text in request.attempt or [] for effect in find_effects(text)]

@@ -232,9 +232,7 @@ class Fitted:
     """What is fitted, and how."""
 
     model: ChosenModelOption = None
-    estimator: Annotated[
-        str, typer.Option(help="filter, handheld, batch, classical; auto chooses one of the first two.")
-    ] = "auto"
+    estimator: Annotated[str, typer.Option(help="filter, handheld, batch; auto chooses one of the first two.")] = "auto"
     hand: Annotated[bool, typer.Option("--hand", help="Moved by hand: the same as --estimator handheld.")] = False
     add: Annotated[
         list[str] | None,

@@ -52,7 +52,6 @@ CASES = (
     Case(HANDHELD_IMU, "handheld"),
     Case("dtg", "batch"),
     Case("mems_industrial", "batch"),
-    Case("dtg", "classical"),
 )
 TABLE_IMUS = ("dtg", "rlg_navigation", "fog_tactical", "mems_industrial", "mems_consumer")
 
@@ -102,11 +101,7 @@ def test_a_result_is_written_read_compensated_and_exported(case, tmp_path):
     assert np.isfinite(done.f_ib_b).all()
     for form in FORMS:
         path = tmp_path / f"out-{form}.txt"
-        if case.estimator == "classical" and form in {"kalibr", "openvins"}:
-            with pytest.raises(DataError, match="body frame 'table'"):
-                export(form, path, again, load_imu(case.imu))
-        else:
-            assert export(form, path, again, load_imu(case.imu)).files
+        assert export(form, path, again, load_imu(case.imu)).files
 
 
 def test_a_fit_answers_every_question(case):
@@ -119,8 +114,8 @@ def test_a_fit_answers_every_question(case):
     residual = evidence.e - evidence.W[:, evidence.model] @ estimate
     if case.estimator == "handheld":
         assert residual @ residual == pytest.approx(fit.solution.chi2, rel=0.02)
-    elif case.estimator != "classical":
-        # Whitened residuals of a right model have unit variance; the classical one is wrong by the mount.
+    else:
+        # Whitened residuals of a right model have unit variance.
         assert residual @ residual / len(residual) == pytest.approx(1.0, abs=0.15)
         assert fit.held_out_rms() == pytest.approx(1.0, abs=0.25)
     assert fit.converged
@@ -133,11 +128,6 @@ def test_a_fit_answers_every_question(case):
 
 
 def test_a_fit_is_diagnosed_and_shown(case, tmp_path):
-    if case.estimator == "classical":
-        # The classical coefficients stand in the axes of the table, a mount of degrees from the sensors' own.
-        with pytest.raises(DataError, match="axes of the table"):
-            climb(fit_of(case))
-        return
     summary = summarise(climb(fit_of(case)))
     write_diagnosis(tmp_path / "diagnosis.json", summary)
     read = read_diagnosis(tmp_path).plain()
@@ -156,9 +146,7 @@ def test_free_navigation_is_made_or_refused_with_its_reason(case):
         return
     for run in fit.free_inertial([]):
         nothing, compensated = run.drifts
-        if case.estimator != "classical":
-            # The azimuth to start with is that of the fit: a mount of degrees spoils the classical one.
-            assert compensated.distance[-1] < nothing.distance[-1]
+        assert compensated.distance[-1] < nothing.distance[-1]
         assert np.isfinite(compensated.distance).all()
 
 

@@ -202,10 +202,10 @@ def test_gravity_goes_with_the_geodetic_part_of_a_latitude_alone():
     assert [size for _, size in surveyed] == [pytest.approx(5e-4), 1e-6]
 
 
-def test_the_classical_estimator_says_that_it_takes_the_site_at_its_word():
+def test_the_batch_estimator_says_that_it_takes_the_site_at_its_word():
     test = PreparedTest(recorded()[0], IMU, off(**SIGMAS))
-    with pytest.raises(DataError, match="estimator 'classical' cannot estimate the site: leave latitude_sigma out"):
-        solve(test, MODEL, "classical")
+    with pytest.raises(DataError, match="estimator 'batch' cannot estimate the site: leave latitude_sigma out"):
+        solve(test, MODEL, "batch")
 
 
 def test_recordings_of_a_set_share_what_their_site_is_off_by():

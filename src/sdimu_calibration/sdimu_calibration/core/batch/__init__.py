@@ -1,1 +1,1 @@
-"""The estimators of another kind: one least squares over dwells and turns; the classical one from table angles."""
+"""The estimator of another kind: one least squares over dwells and turns."""

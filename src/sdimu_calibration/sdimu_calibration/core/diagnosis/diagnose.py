@@ -38,17 +38,10 @@ from sdimu_calibration.core.evidence.navigation_evidence import NavigationEviden
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.posterior.told import Probabilities, Share, may_be, probabilities
 from sdimu_calibration.core.progress import Progress, silent
-from sdimu_calibration.core.recording import DataError, Recording
+from sdimu_calibration.core.recording import Recording
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.core.wording import Option
-
-NOT_DIAGNOSABLE = (
-    "the classical estimator gives coefficients in the axes of the table: a navigation about them shows the mount, and "
-    f"no missing effect; diagnose with another {Option.ESTIMATOR} (in Python estimator=...)"
-)
-"""Why a classical fit is not diagnosed."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +176,6 @@ def climb(
     without : collection of str
         Registry names of effects that are not tried, as if the catalogue lacked them.
     """
-    if not fit.diagnosable:
-        raise DataError(NOT_DIAGNOSABLE)
     stated = fit.test.imu
     base, consistency, noise = in_measured_noise(fit, progress)
     wander = None if base.learns_scatter else base.wander.in_white

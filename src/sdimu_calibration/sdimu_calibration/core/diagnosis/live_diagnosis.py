@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.diagnose import NOT_DIAGNOSABLE, Diagnosis, climb
+from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, climb
 from sdimu_calibration.core.diagnosis.measured_noise import in_measured_noise
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.survey import survey
@@ -23,7 +23,6 @@ from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.consistency import StopMean
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.posterior.told import Probabilities
-from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 
@@ -145,10 +144,7 @@ def error_of(test: PreparedTest, model: Model, added: Sequence[str] = ()) -> Mod
 
 
 def _fit(test: PreparedTest, model: Model) -> tuple[Fit, tuple[str, ...]]:
-    fit = solve(test, model, learn=False)
-    if not fit.diagnosable:
-        raise DataError(NOT_DIAGNOSABLE)
-    fit, _, noise = in_measured_noise(fit)
+    fit, _, noise = in_measured_noise(solve(test, model, learn=False))
     return fit, noise
 
 

@@ -139,8 +139,6 @@ class Fit(ABC):
     """Name of the estimator."""
     learns_scatter = False
     """The estimator learns the noise beyond white noise from the residuals, a missing effect with it."""
-    diagnosable = True
-    """The navigation about the coefficients shows what the sensors do, and not how they are mounted."""
     azimuth_free = False
     """The azimuth is a convention, and the horizontal Earth rate is estimated in its place."""
     free_inputs_testable = True

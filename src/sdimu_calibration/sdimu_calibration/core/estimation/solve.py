@@ -4,7 +4,7 @@
 |---|---|
 | ``handheld`` | a hand turned the IMU, or the gyros' white noise in the usual rest hides the Earth's rate |
 | ``filter`` | otherwise |
-| ``batch``, ``classical`` | by request |
+| ``batch`` | by request |
 
 The choice depends on the noise in the IMU file, the turns, and the length of the rests: table or hand, no size of an
 error. ``second-order`` is an older name of ``filter``.
@@ -24,15 +24,14 @@ from sdimu_calibration.core.alignment.coarse_alignment import StartPoint, coarse
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude, set_up, weighed_for
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.batch.batch import solve_batch
-from sdimu_calibration.core.batch.classical import TABLE_FRAME, solve_classical
 from sdimu_calibration.core.data.imu_class import understated_noise
-from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.accelerometer_frame import FRAME, AccelerometerFrameModel, as_asked, model_in_frame
+from sdimu_calibration.core.effects.accelerometer_frame import AccelerometerFrameModel, as_asked, model_in_frame
 from sdimu_calibration.core.effects.earth_rate import NAMES as EARTH_RATE
 from sdimu_calibration.core.effects.earth_rate import with_any_direction
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.imu_model import with_references
 from sdimu_calibration.core.effects.references import stated_references
+from sdimu_calibration.core.estimation.batch_fit import BatchFit
 from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
@@ -40,7 +39,6 @@ from sdimu_calibration.core.estimation.handheld_solve import solve_handheld
 from sdimu_calibration.core.estimation.navigation_fit import FILTER, NavigationFit
 from sdimu_calibration.core.estimation.noise_learning import noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
-from sdimu_calibration.core.estimation.reference_fits import BatchFit, ClassicalFit
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
 from sdimu_calibration.core.filter.solution import Solution, attitude_about
@@ -243,7 +241,7 @@ def _framed(setup: TestSetup, azimuth_free: bool = False, turns: bool = True) ->
 
 @dataclass(frozen=True)
 class _Reduced:
-    """What both reference estimators begin with."""
+    """What a navigation about known coefficients begins with."""
 
     setup: TestSetup
     prepared: PreparedData
@@ -265,21 +263,7 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
     covariance = frame_model.covariance(found.covariance, found.coefficients)
     summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
     about = _navigation_about(test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients)
-    return BatchFit(test, model, setup.sensors, model.body_frame, values, covariance, summary, about)
-
-
-def _classical(test: PreparedTest, model: Model, _start: Start | None, progress: Progress) -> Fit:
-    begun = _reduced(test, model, progress)
-    setup = begun.setup
-    progress("least squares", 0.2)
-    found = solve_classical(begun.prepared, setup, test.recording.table)
-    summary = FitStatistics(-0.5 * found.chi2, found.chi2 / max(found.dof, 1), float(found.dof), 1.0)
-    # The mount stands in the misalignments: turned into the accelerometers' frame they are those of the sensors.
-    turned = body_frame.values_in_frame(setup.sensors.names, found.values, FRAME)
-    about = _navigation_about(
-        test, model, begun, as_asked(setup.sensors, model.body_frame), begun.alignment.C_nb, turned
-    )
-    return ClassicalFit(test, model, setup.sensors, TABLE_FRAME, found.values, found.covariance, summary, about)
+    return BatchFit(test, model, setup.sensors, values, covariance, summary, about)
 
 
 def fit_about(
@@ -338,7 +322,6 @@ ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress],
     FILTER: _filter,
     HandheldFit.estimator: solve_handheld,
     BatchFit.estimator: _batch,
-    ClassicalFit.estimator: _classical,
 }
 """Every estimator by its name."""
 OLDER_NAMES: Mapping[str, str] = {"second-order": FILTER}

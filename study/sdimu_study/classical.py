@@ -14,54 +14,80 @@ rate-table testing).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sdimu_calibration.core import earth
-from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, set_up, weighed_for
 from sdimu_calibration.core.alignment.rest_means import layout
 from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.motion import NO_PAST, Motion
+from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.navigation.track import MAGNETIC_FIELD, temperatures
-from sdimu_calibration.core.recording import DataError, TableLog
+from sdimu_calibration.core.recording import DataError, Recording, TableLog
+from sdimu_calibration.core.specification import ImuSpecification, Model, Site
 
 GIMBALS = ("Y", "Z", "X")
 """IMU axes about which outer, middle and inner table axis turn when all angles are zero."""
 TABLE_FRAME = "table"
+"""Name of the axes of the table as a body frame."""
 
 
 @dataclass(frozen=True)
-class ClassicalSolution:
+class ClassicalResult:
     """Coefficients with the table's angles as reference."""
 
+    model: tuple[str, ...]
+    """Keys of the effects, as a `Calibration` has them."""
+    names: tuple[str, ...]
+    """Coefficients in the order of `values`, length p."""
+    body_frame: str
+    """Of the coefficients."""
     values: Floats
     covariance: Floats
-    """`values`, `covariance`: SI, in the axes of the table, shapes (p,) and (p, p)."""
+    """`values`, `covariance`: SI, in `body_frame`, shapes (p,) and (p, p)."""
     chi2: float
     dof: int
 
+    @property
+    def nis(self) -> float:
+        """Chi-square per degree of freedom: 1 where the angles of the table explain the samples."""
+        return self.chi2 / max(self.dof, 1)
 
-def solve_classical(prepared: PreparedData, setup: TestSetup, table: TableLog | None) -> ClassicalSolution:
+    def turned(self, frame: str) -> ClassicalResult:
+        """Turn the coefficients from the axes of the table into another body frame, exactly."""
+        J = body_frame.jacobian_at(self.names, self.values, frame)
+        values = body_frame.values_in_frame(self.names, self.values, frame)
+        return replace(self, body_frame=frame, values=values, covariance=J @ self.covariance @ J.T)
+
+
+def calibrate_classically(recording: Recording, site: Site, imu: ImuSpecification, model: Model) -> ClassicalResult:
     """Calibrate an IMU against the angles of the table.
 
     Parameters
     ----------
-    setup : TestSetup
+    recording : Recording
+        With the angles of outer, middle and inner axis.
+    imu : ImuSpecification
         Its noise weighs the means; its priors are not used.
-    table : TableLog or None
-        Angles of the table's axes (rad).
     """
-    seen = reference_motion(prepared, setup, _gimbal_log(table))
-    return ClassicalSolution(*_fit(prepared, setup, seen))
+    log, test = _gimbal_log(recording.table), PreparedTest(recording, imu, site)
+    setup = set_up(site, imu, model, test.epoch_s(model.settle_s))
+    prepared = test.data(setup)
+    setup = weighed_for(setup, prepared)
+    sensors, fitted = setup.sensors, _fit(prepared, setup, reference_motion(prepared, setup, log))
+    return ClassicalResult(tuple(e.key for e in sensors.effects), sensors.names, TABLE_FRAME, *fitted)
 
 
 def _gimbal_log(log: TableLog | None) -> TableLog:
     if log is None or not len(log.t):
-        raise DataError("/rate_table/joint_states: missing; the classical estimator takes its references from them")
+        raise DataError("/rate_table/joint_states: missing; the classical calibration takes its references from them")
     if set(log.names) != {"outer", "middle", "inner"}:
         raise DataError(
-            f"/rate_table/joint_states: axes {', '.join(log.names)}; the classical estimator needs outer, middle, inner"
+            f"/rate_table/joint_states: axes {', '.join(log.names)}; the classical calibration needs outer, middle, "
+            "inner"
         )
     return log
 
@@ -163,7 +189,7 @@ def _fit(prepared: PreparedData, setup: TestSetup, seen: Motion) -> tuple[Floats
     R = np.linalg.qr(rows, mode="r")
     if np.min(np.abs(np.diag(R))) < 1e-6 * np.max(np.abs(np.diag(R))):
         name = model.names[int(np.argmin(np.abs(np.diag(R))))]
-        raise DataError(f"this test does not show '{name}' to the classical estimator; leave its effect out")
+        raise DataError(f"this test does not show '{name}' to the classical calibration; leave its effect out")
     x = np.linalg.lstsq(rows, rhs, rcond=None)[0]
     inverse = np.linalg.inv(R)
     chi2 = float(np.sum((rows @ x - rhs) ** 2))

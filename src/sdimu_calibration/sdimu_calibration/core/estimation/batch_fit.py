@@ -1,7 +1,7 @@
-"""Fits by other methods than navigation: batch least squares, and the classical one against the table's angles.
+"""The fit by batch least squares.
 
-Their residuals are not innovations, so what a diagnosis asks of them is answered by a navigation about their
-coefficients that keeps them as they are.
+Its residuals are not innovations, so what a diagnosis asks of it is answered by a navigation about its coefficients
+that keeps them as they are.
 """
 
 from __future__ import annotations
@@ -12,35 +12,32 @@ from dataclasses import dataclass, replace
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.fit import Fit, Start
-from sdimu_calibration.core.estimation.fit_words import MISFIT
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.fit_statistics import FitStatistics
-from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.recording import DataFault
-from sdimu_calibration.core.wording import Work
 
 
 @dataclass(frozen=True)
-class ReferenceFit(Fit):
-    """A fit whose residuals are those of a navigation about its coefficients."""
+class BatchFit(Fit):
+    """One least squares over all dwells and turns; its residuals are those of a navigation about its coefficients."""
 
-    frame: str
     coefficients: Floats
     coefficient_covariance: Floats
-    """`coefficients`, `coefficient_covariance`: SI, in `frame`, shapes (p,) and (p, p)."""
+    """`coefficients`, `coefficient_covariance`: SI, in `body_frame`, shapes (p,) and (p, p)."""
     summary: FitStatistics
     """Of the least squares."""
     about: NavigationFit
     """About the coefficients of this fit."""
+    estimator = "batch"
 
     @property
     def body_frame(self) -> str:
-        """Name of the frame of `values`."""
-        return self.frame
+        """Frame that the model asks for."""
+        return self.model.body_frame
 
     @property
     def values(self) -> Floats:
@@ -124,28 +121,3 @@ class ReferenceFit(Fit):
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid on parts that no fit has seen; each is fitted again by navigation."""
         return self.about.free_inertial(rivals)
-
-
-class BatchFit(ReferenceFit):
-    """One least squares over all dwells and turns."""
-
-    estimator = "batch"
-
-
-class ClassicalFit(ReferenceFit):
-    """Least squares of stops and turns against the table's angles."""
-
-    estimator = "classical"
-    diagnosable = False
-
-    def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
-        """Say where the angles of the table leave over more than noise; then what the navigation says."""
-        nis = statistics.nis_mean
-        # The navigation knows no angle of the table, and is judged by its own innovations.
-        about = replace(self.about.statistics(), held_out_rms=statistics.held_out_rms)
-        told = (
-            f"the angles of the table do not explain the samples (NIS {nis:.3f}; 1 is right): the IMU stands askew on "
-            "the table, its angles are wrong, or physics is missing"
-        )
-        own = [Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")] if nis > MISFIT else []
-        return (*own, *self.about.warnings(about))
