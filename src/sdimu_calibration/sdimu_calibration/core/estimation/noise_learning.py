@@ -31,14 +31,6 @@ SUSPECTED_P = 0.05
 coefficient by half its sigma shows there, and one clean test in twenty only costs the time of a look."""
 
 
-def with_noise_learned(fit: F) -> F:
-    """Learn the noise of a fit where its innovations contradict white noise; else return the fit as it is.
-
-    Only a fit that navigates by its own passes learns noise; a handheld one learns scatter instead.
-    """
-    return noise_of(fit).taken_by(fit)
-
-
 @dataclass(frozen=True)
 class FoundNoise:
     """Noise terms that the innovations of a fit ask for."""
@@ -61,7 +53,10 @@ class FoundNoise:
 
 
 def noise_of(fit: Fit) -> FoundNoise:
-    """Learn the noise of a fit where its innovations contradict white noise."""
+    """Learn the noise of a fit where its innovations contradict white noise.
+
+    Only a fit that navigates by its own passes learns noise; a handheld one learns scatter instead.
+    """
     if not isinstance(fit, NavigationFit) or not suspected(fit):
         return FoundNoise()
     wander = fit.wander

@@ -119,12 +119,12 @@ def _likely_cause(test: PreparedTest, model: Model) -> str:
 
 
 def _check(test: PreparedTest, model: Model, estimator: str) -> None:
-    if estimator in _TAKES_PRIORS:
+    if estimator == FILTER:
         return
     if model.priors:
         raise DataError(
             f"priors.{model.priors[0].name}: the estimator '{estimator}' takes priors from the IMU's file only: "
-            f"leave them out of the model, or use one of {', '.join(_TAKES_PRIORS)}"
+            f"leave them out of the model, or use '{FILTER}'"
         )
     if estimator == HandheldFit.estimator and test.held_out:
         raise DataError(
@@ -132,14 +132,13 @@ def _check(test: PreparedTest, model: Model, estimator: str) -> None:
         )
     if (test.held_out or test.excluded) and estimator != HandheldFit.estimator:
         raise DataError(
-            f"the estimator '{estimator}' cannot leave stops out: cut the recording ({Work.CUT}), or use one of "
-            f"{', '.join(_TAKES_PRIORS)}"
+            f"the estimator '{estimator}' cannot leave stops out: cut the recording ({Work.CUT}), or use '{FILTER}'"
         )
     site = test.site
     if site is not None and estimator != HandheldFit.estimator and stated_references(site):
         raise DataError(
             f"the estimator '{estimator}' cannot estimate the site: leave {next(iter(site.sigmas))} out of its file, "
-            f"or use one of {', '.join(_TAKES_PRIORS)}"
+            f"or use '{FILTER}'"
         )
 
 
@@ -239,30 +238,16 @@ def _framed(setup: TestSetup, azimuth_free: bool = False, turns: bool = True) ->
     return replace(found, inner=with_references(inner, stated_references(setup.site)))
 
 
-@dataclass(frozen=True)
-class _Reduced:
-    """What a navigation about known coefficients begins with."""
-
-    setup: TestSetup
-    prepared: PreparedData
-    alignment: Alignment
-
-
-def _reduced(test: PreparedTest, model: Model, progress: Progress) -> _Reduced:
-    setup, prepared = _prepared(test, model, progress)
-    return _Reduced(setup, prepared, first_attitude(prepared.epochs, prepared.phases, setup))
-
-
 def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Progress) -> Fit:
-    begun = _reduced(test, model, progress)
-    setup = begun.setup
+    setup, prepared = _prepared(test, model, progress)
+    alignment = first_attitude(prepared.epochs, prepared.phases, setup)
     frame_model = model_in_frame(setup.sensors, setup.imu, model.body_frame)
     inner = replace(setup, sensors=frame_model.inner)
-    found = solve_batch(begun.prepared, inner, begun.alignment, progress)
+    found = solve_batch(prepared, inner, alignment, progress)
     values = frame_model.values(found.coefficients)
     covariance = frame_model.covariance(found.covariance, found.coefficients)
     summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
-    about = _navigation_about(test, model, replace(begun, setup=inner), frame_model, found.C_nb[0], found.coefficients)
+    about = _navigation_about(test, model, inner, prepared, alignment, frame_model, found.C_nb[0], found.coefficients)
     return BatchFit(test, model, setup.sensors, values, covariance, summary, about)
 
 
@@ -279,36 +264,36 @@ def fit_about(
         Gives the attitude at the start where it is known. Of a fit without an azimuth it also gives the Earth rate in
         its place, and this fit does without one, too.
     """
-    begun = _reduced(test, model, silent)
+    setup, prepared = _prepared(test, model, silent)
+    alignment = first_attitude(prepared.epochs, prepared.phases, setup)
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
     azimuth_free = here.keys() >= set(EARTH_RATE)
-    frame_model = _framed(begun.setup, azimuth_free)
+    frame_model = _framed(setup, azimuth_free)
     sensors = frame_model.inner
-    begun = replace(begun, setup=replace(begun.setup, sensors=sensors))
-    C_nb = begun.alignment.C_nb if start is None else start.C_nb
+    C_nb = alignment.C_nb if start is None else start.C_nb
     known_here = dict(coefficients)
     if azimuth_free:
-        begun = replace(begun, alignment=begun.alignment.with_azimuth_of(C_nb))
+        alignment = alignment.with_azimuth_of(C_nb)
         known_here |= {name: here[name] for name in EARTH_RATE}
     values = np.array([known_here.get(name, 0.0) for name in sensors.names])
-    fixed = replace(sensors, prior=np.zeros(len(sensors.prior)), mean=values)
-    known = replace(begun, setup=replace(begun.setup, sensors=fixed))
+    known = replace(setup, sensors=replace(sensors, prior=np.zeros(len(sensors.prior)), mean=values))
     if start is None:
-        C_nb = attitude_about(known.prepared, known.setup, known.alignment, C_nb, values)
-    fit = _navigation_about(test, model, known, frame_model, C_nb, values)
-    return replace(fit, setup=begun.setup)
+        C_nb = attitude_about(prepared, known, alignment, C_nb, values)
+    fit = _navigation_about(test, model, known, prepared, alignment, frame_model, C_nb, values)
+    return replace(fit, setup=replace(setup, sensors=sensors))
 
 
 def _navigation_about(
     test: PreparedTest,
     model: Model,
-    begun: _Reduced,
+    setup: TestSetup,
+    prepared: PreparedData,
+    alignment: Alignment,
     frame_model: AccelerometerFrameModel,
     C_nb: Floats,
     coefficients: Floats,
 ) -> NavigationFit:
     """Navigate about coefficients that stay as they are; the attitude is the filter's own."""
-    setup, prepared, alignment = begun.setup, begun.prepared, begun.alignment
     first = one_pass(prepared, setup, alignment, C_nb, coefficients)
     last = one_pass(prepared, setup, alignment, first.smoothed_start, coefficients)
     last.state.x[NAV : NAV + len(coefficients)] = 0.0
@@ -316,8 +301,6 @@ def _navigation_about(
     return NavigationFit(test, model, frame_model.asked, setup, prepared, alignment, solution, frame_model)
 
 
-_TAKES_PRIORS = (FILTER,)
-"""Estimators that take priors of single coefficients, and leave measurements out."""
 ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress], Fit]] = {
     FILTER: _filter,
     HandheldFit.estimator: solve_handheld,

@@ -19,7 +19,7 @@ from sdimu_calibration.core.estimation.fit import Fit, Start
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
-from sdimu_calibration.core.estimation.noise_learning import in_noise, with_noise_learned
+from sdimu_calibration.core.estimation.noise_learning import in_noise, noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import AUTO, fit_about, solve
 from sdimu_calibration.core.evidence.linear import LinearEvidence
@@ -196,7 +196,7 @@ def _fitted(job: Job, test: PreparedTest) -> Fit:
         return _own(test, model, job)
     fit = fit_about(test, model, _untagged(job.about, job.member.name), job.start)
     if job.noise is None:
-        return fit if job.function else with_noise_learned(fit)
+        return fit if job.function else noise_of(fit).taken_by(fit)
     evidence = fit.bare
     return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise, held_out=False) if job.noise else fit
 
