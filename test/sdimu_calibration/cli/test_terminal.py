@@ -81,6 +81,24 @@ class Terminal:
             check=False,
         )
 
+    def unread(self, *arguments: object, both: bool = False) -> subprocess.CompletedProcess[str]:
+        """Run the program as a process of its own, with a pipe that nobody reads; `both`: for stderr, too."""
+        reader, writer = os.pipe()
+        os.close(reader)
+        try:
+            return subprocess.run(
+                [sys.executable, "-m", "sdimu_calibration.cli.main", *map(str, arguments)],
+                cwd=self.folder,
+                env=self.environment(terminal=False),
+                stdout=writer,
+                stderr=writer if both else subprocess.PIPE,
+                text=True,
+                timeout=300,
+                check=False,
+            )
+        finally:
+            os.close(writer)
+
     @staticmethod
     def environment(terminal: bool) -> dict[str, str]:
         kept = {k: v for k, v in os.environ.items() if k not in {"NO_COLOR", "FORCE_COLOR", "TERM"}}
@@ -170,6 +188,42 @@ def test_a_verb_answers_in_json_alone_as_its_file_does_and_speaks_plainly_beside
     assert "…" not in done.stderr
     rules = [line for line in done.stderr.splitlines() if set(line.strip()) == {"─"}]
     assert all(len(line) <= WIDTH for line in rules)
+
+
+LEAVES = {
+    "calibrate": "again/result.json",
+    "set": "both/result.json",
+    "diagnose": "diagnosed/diagnosis.json",
+    "compare": "results/base1/result.json",
+    "predict": "out/predict/prediction.json",
+    "plan": "out/plan/found.yaml",
+    "noise": "noise/noise.json",
+    "fleet": "fleet/fleet.json",
+    "datasheet": "sheet/datasheet.json",
+}
+"""What a verb leaves."""
+
+
+@pytest.mark.parametrize("verb", LEAVES)
+@pytest.mark.parametrize("both", [False, True])
+def test_a_reader_that_closes_the_pipe_costs_no_results(sdimu, verb, both):
+    """As of ``sdimu diagnose BAG | head -3``, and with stderr in the same pipe: all ends as with a reader."""
+    asked, left = ANSWERS[verb][0], sdimu.folder / LEAVES[verb]
+    if "--out" in asked or verb == "predict":
+        shutil.rmtree(left.parent, ignore_errors=True)
+    status = sdimu(*asked).returncode
+    if "--out" in asked or verb == "predict":
+        shutil.rmtree(left.parent)
+    done = sdimu.unread(*asked, both=both)
+    assert done.returncode == status
+    assert both or "not to be trusted" in done.stderr or not done.stderr
+    assert left.is_file()
+    assert not list(sdimu.folder.glob("**/*.part"))
+
+
+def test_a_long_answer_whose_reader_has_gone_ends_quietly(sdimu):
+    done = sdimu.unread("effects", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("terminal", [False, True])

@@ -81,11 +81,11 @@ def datasheet(
         version=sdimu_calibration.__version__,
         recordings=hashed(entries, certified.recording or []) if certified.certificate else (),
     )
-    print_table(console, HEADINGS, rows(lines, short=True), left=1)
     folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
     with written_together(folder) as part:
         write_datasheet(part / "datasheet.json", lines, about, entries)
         write_page(part / "datasheet.html", lines, about, entries, certified.certificate)
+    print_table(console, HEADINGS, rows(lines, short=True), left=1)
     for name, digest in about.recordings:
         if not digest:
             say(console, f"note: {name} was not found, so it has no hash: --recording BAG")

@@ -94,15 +94,16 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     found = held_to_use(found, more)
     summary = summarise(found)
     about = replace(Asked.of((bag,), folder, opening, request), has_plan=as_plan(summary.plan) is not None)
-    print_summary(console, summary, about, more)
     null = None
     if request.bootstrap:
         with bar(console) as progress:
             null = repeat_on_noise(found, request.bootstrap, progress=progress)
-        say(console, f"bootstrap: {null.sentence}")
     with bar(console):
         trace = traced([bag], sys.argv[1:], site=opening.site, imu=opening.imu, model=request.model)
         _write(Findings(about, f"Diagnosis of {bag.name}", summary, more, null), trace)
+    print_summary(console, summary, about, more)
+    if null is not None:
+        say(console, f"bootstrap: {null.sentence}")
     printed(folder / "report.html")
     tell(console, (*notes, *(note for note in notes_of_diagnosis(found) if note not in notes)))
     say(console, f"results in {folder}")

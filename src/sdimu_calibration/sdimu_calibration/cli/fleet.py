@@ -48,17 +48,16 @@ def fleet(
     alone = candidates(gathered.given)
     done = study(as_measured(gathered.entries), gathered.entries[0].result.model, alone)
     units = display_units(gathered, alone)
-    say(console, headline(gathered, done))
-    print_table(console, tables.HEADINGS, tables.rows(done, units), left=2)
-    for line in tables.sentences(done, units):
-        say(console, line)
     folder = out or (folders[0] if folders[0].is_dir() else folders[0].parent)
     with written_together(folder) as part:
         write_fleet(part / "fleet.json", gathered, done)
         write_page(part / "fleet.html", gathered, done, alone, f"Fleet of {folders[0].resolve().name}")
+    written = write_priors(priors, imu or gathered.entries[0].result.origin.imu, gathered, done) if priors else ()
+    say(console, headline(gathered, done))
+    print_table(console, tables.HEADINGS, tables.rows(done, units), left=2)
+    for line in tables.sentences(done, units):
+        say(console, line)
     if priors is not None:
-        base = imu or gathered.entries[0].result.origin.imu
-        written = write_priors(priors, base, gathered, done)
         say(console, f"priors of {len(written)} effects in {priors}; use: --imu {priors}")
     say(console, f"fleet.json and fleet.html in {folder}")
     answer(folder / "fleet.json", as_json)

@@ -23,6 +23,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 import sdimu_calibration
+from sdimu_calibration.cli.closed_pipe import outliving_readers
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.units import UnitError
@@ -122,8 +123,14 @@ def _root(
 def main() -> None:
     """Run `sdimu`: exit 0 when done, 1 with one line when data or options are unusable, 2 on wrong usage.
 
-    `options.leave` ends with 3 when all is done and the estimate is not to be trusted.
+    `opened.leave` ends with 3 when all is done and the estimate is not to be trusted, `datasheet` when a limit is
+    missed. A reader of the output that closes its pipe changes none of it.
     """
+    with outliving_readers():
+        _run()
+
+
+def _run() -> None:
     try:
         with _ending_tidily():
             app()

@@ -235,6 +235,10 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
         )
         answer(_content(start, known, first, found, limits, None), request.as_json)
         return
+    reached = f"worst sigma {found.worst:.3f} of its limit" if limits else "tells most beyond what was known"
+    if found.plan is not start:
+        about = f"Found by sdimu plan from {start.name} among {found.tried} plans: {found.minutes:.1f} min."
+        write_plan(out, found.plan, [about, f"IMU {asked.imu}, site {asked.site}, {reached}."])
     title = f"sigma, the largest of the axes: {start.name} and {out.stem}"
     print_table(console, *_table(start, known, first, found, limits), title)
     if before:
@@ -250,9 +254,6 @@ def _search(console: Console, asked: _Begun, allowed: Allowed, request: PlanRequ
         say(console, f"nothing better than {start.name} among {found.tried} plans; no file written")
         answer(_content(start, known, first, found, limits, None), request.as_json)
         return
-    about = f"Found by sdimu plan from {start.name} among {found.tried} plans: {found.minutes:.1f} min."
-    reached = f"worst sigma {found.worst:.3f} of its limit" if limits else "tells most beyond what was known"
-    write_plan(out, found.plan, [about, f"IMU {asked.imu}, site {asked.site}, {reached}."])
     say(
         console,
         f"{start.name} {start.duration_s / 60.0:.1f} min; found {found.minutes:.1f} min, {reached}, {found.tried} "

@@ -57,14 +57,15 @@ def predict(
     if assumed is not None and printed:
         rows = _beside(what, assumed, printed, prediction)
         published = tuple(printed), rows
-        headings = ("largest of the axes", *printed, "off by", "unit")
-        print_table(console, headings, rows, f"{assumed.reference}: here (printed), by mount")
-    print_table(console, COLUMNS, coefficient_rows(prediction), f"body frame: {prediction.body_frame}")
-    for found in prediction.unobservable:
-        say(console, f"not observable: {found.text}")
     with written_together(out) as part:
         write_prediction(part / "prediction.json", prediction, about)
         write_page(part / "prediction.html", prediction, about, published)
+    if assumed is not None and published is not None:
+        headings = ("largest of the axes", *published[0], "off by", "unit")
+        print_table(console, headings, published[1], f"{assumed.reference}: here (printed), by mount")
+    print_table(console, COLUMNS, coefficient_rows(prediction), f"body frame: {prediction.body_frame}")
+    for found in prediction.unobservable:
+        say(console, f"not observable: {found.text}")
     say(console, f"results in {out}")
     answer(out / "prediction.json", as_json)
 

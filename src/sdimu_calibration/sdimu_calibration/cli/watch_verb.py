@@ -145,7 +145,8 @@ def _end(is_over: bool, seconds: float, folder: str) -> End:
 
     if is_over:
         return ended(folder, "the report is there some seconds later" if folder else "")
-    return End(True, f"Watched for {seconds:g} s, as asked; the test goes on.")
+    how = f"for {seconds:g} s, as asked" if seconds else "as long as its words were read"
+    return End(True, f"Watched {how}; the test goes on.")
 
 
 @dataclass
@@ -236,13 +237,14 @@ def _follow(watching: _Watching, domain: int | None, seconds: float) -> bool:
     """
     import time
 
+    from sdimu_calibration.cli.closed_pipe import is_read
     from sdimu_calibration.cli.processes import is_held
     from sdimu_calibration.cli.watch import Watch
 
     begun = time.monotonic()
     pace, monitor = Pace(), watching.monitor
     with Watch(watching.console, watching.outline) as shown:
-        while not seconds or time.monotonic() - begun < seconds:
+        while is_read() and (not seconds or time.monotonic() - begun < seconds):
             now = monitor.listen(0.2)
             wall_s = pace.wall(now.table_s, time.monotonic() - begun)
             shown.show(now, True, wall_s)
