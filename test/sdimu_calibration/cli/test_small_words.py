@@ -50,6 +50,19 @@ def test_help_names_no_type_beside_an_option_that_takes_no_value(sdimu, verb):
     assert "<bool>" not in out
 
 
+@pytest.mark.parametrize("verb", [name for name in cli._VERBS if name not in {"bag", "set"}])
+def test_help_has_words_and_ranges_in_the_place_of_types(sdimu, verb):
+    out = sdimu(verb, "--help")
+    assert "--help" in out
+    assert not re.search(r"<(list\[|int|float|str|path|file|directory)|x[<>]=", out), out
+
+
+def test_help_names_what_an_option_takes_and_its_range(sdimu):
+    assert re.search(r"--workers +N >= 1 ", sdimu("calibrate", "--help"))
+    assert re.search(r"--out +FOLDER ", sdimu("diagnose", "--help"))
+    assert re.search(r"--truth +FILE ", sdimu("calibrate", "--help"))
+
+
 def test_a_line_keeps_the_spaces_that_say_it_belongs_to_the_one_above(capsys):
     say(plain(width=60), "  below")
     assert capsys.readouterr().out == "  below\n"

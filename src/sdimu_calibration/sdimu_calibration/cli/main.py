@@ -54,6 +54,8 @@ _LIKE = 0.6
 """Share of letters (1) from which a verb looks like what was typed: one letter more, less or other."""
 _LONGEST_VERB = 60
 """Number of characters of a verb that is none (1) that a message shows."""
+_WORDS = {"Path": "FILE", "int": "N", "float": "NUMBER"}
+"""What stands in help for a type of Python; any other is a text."""
 _MORE = "More"
 """Where verbs of other packages stand that have no place above."""
 
@@ -69,7 +71,7 @@ class Verbs(TyperGroup):
     def get_params(self, ctx: Any) -> Any:
         """Options of `sdimu` itself, and its help."""
         options = super().get_params(ctx)
-        _take_no_type(options)
+        _speak_plainly(options)
         return options
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -200,17 +202,43 @@ def _unavailable(name: str, error: ImportError) -> Callable[[], None]:
     return verb
 
 
-def _take_no_type(options: Iterable[Any]) -> None:
+def _speak_plainly(options: Iterable[Any]) -> None:
+    """Name what an option takes by a word, and its range behind it: typer writes ``<list[Path]>`` and ``[x>=1]``."""
     for option in options:
-        if getattr(option, "is_flag", False) and option.metavar is None:
-            option.metavar = ""
+        # A second look at the same command finds its range in its word already.
+        if getattr(option, "is_flag", False):
+            option.metavar = option.metavar or ""
+        elif option.param_type_name == "argument":
+            option.display_type_rich = _nothing
+        elif option._get_number_range_help_str is not _nothing:
+            option.metavar = _with_range(option.metavar or _word(option.type_descriptor), option.min, option.max)
+        option._get_number_range_help_str = _nothing
 
 
-def _without_types_of_flags(command: Any) -> None:
-    """Keep help from naming a type beside an option that takes no value: typer writes ``--help <bool>``."""
-    _take_no_type((*command.params, command.get_help_option(typer.Context(command))))
+def _nothing(**_: Any) -> None:
+    """Say nothing, in the place of a method of typer."""
+
+
+def _word(kind: Any) -> str:
+    """Word for what an option takes, as `typer` describes its type."""
+    if kind.is_path:
+        return "FILE" if kind.parameter_info.file_okay else "FOLDER"
+    label = str(kind.annotation)
+    return next((word for name, word in _WORDS.items() if name in label), "TEXT")
+
+
+def _with_range(word: str, least: float | None, most: float | None) -> str:
+    """Write a word with its range: ``N >= 1``, ``0 <= N <= 232``."""
+    if least is None:
+        return word if most is None else f"{word} <= {most:g}"
+    return f"{word} >= {least:g}" if most is None else f"{least:g} <= {word} <= {most:g}"
+
+
+def _speaking_plainly(command: Any) -> None:
+    """Keep words of a programming language out of the help of a verb and of those inside it."""
+    _speak_plainly((*command.params, command.get_help_option(typer.Context(command))))
     for inner in getattr(command, "commands", {}).values():
-        _without_types_of_flags(inner)
+        _speaking_plainly(inner)
 
 
 def _command(name: str, verb: Any) -> Any:
@@ -221,7 +249,7 @@ def _command(name: str, verb: Any) -> Any:
         verb = single
     command: Any = get_command(verb)
     command.name = name
-    _without_types_of_flags(command)
+    _speaking_plainly(command)
     command.rich_help_panel = next((panel for panel, verbs in _PANELS.items() if name in verbs.split()), _MORE)
     return command
 
