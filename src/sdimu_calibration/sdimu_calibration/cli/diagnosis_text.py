@@ -9,6 +9,7 @@ from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
+from sdimu_calibration.core.diagnosis.ladder import figures_in_words
 from sdimu_calibration.core.diagnosis.verdict import POSSIBLE, beyond, error_falls
 from sdimu_calibration.core.error_figures import held_out, noise_learned
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -16,7 +17,7 @@ from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.units import UnitError, from_si
-from sdimu_calibration.report.cost import OVER_MODELS, in_use, wrong_without
+from sdimu_calibration.report.cost import OVER_MODELS, TOO_LARGE, in_use, wrong_without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -64,7 +65,7 @@ def print_summary(console: Console, summary: DiagnosisSummary, asked: Asked, mor
         line(console, held_out_line(d))
     for text in step_lines(d.found.steps):
         line(console, text)
-    print_ladder(console, d.rungs)
+    print_ladder(console, d.rungs, d.found.noise)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
 
@@ -76,7 +77,8 @@ def cost_lines(summary: DiagnosisSummary, more: ReportExtras | None) -> list[str
     off = wrong_without(summary, more)
     if off:
         rest = f" and {len(off) - _WORST} more" if len(off) > _WORST else ""
-        lines.append(f"wrong without it: {', '.join(one.text for one in off[:_WORST])}{rest}; +-: {OVER_MODELS}")
+        worst = ", ".join(one.text for one in off[:_WORST])
+        lines.append(f"wrong without it: {worst}{rest}; {TOO_LARGE}; +-: {OVER_MODELS}")
     return lines
 
 
@@ -257,14 +259,17 @@ def _size(r: DetectableSize) -> str:
     return f"{r.label} {size:.{0 if size >= _WHOLE else 2}{'f' if size >= _WHOLE else 'g'}} {r.display_unit}"
 
 
-def print_ladder(console: Console, rungs: tuple[Rung, ...]) -> None:
-    """Print the ladder of refits; nothing when there is none."""
+def print_ladder(console: Console, rungs: tuple[Rung, ...], noise: Sequence[NoiseTerm]) -> None:
+    """Print the ladder of refits; nothing when there is none. `noise`: with a memory, that the diagnosis found."""
     if not rungs:
         return
     handheld = rungs[0].scatter is not None
     last = ("beyond white noise",) if handheld else ("jump after turns", "moved by more than 2 sigma")
     headings = ("model", "log-likelihood", "log Bayes factor", "nis", "held-out", *last)
     print_table(console, headings, [_rung(r) for r in rungs], "ladder of refits")
+    line(console, figures_in_words(rungs, noise))
+    if not handheld:
+        line(console, "moved: value less that of the model above, in sigmas of the latter")
 
 
 def _rung(r: Rung) -> list[str]:

@@ -26,6 +26,8 @@ _NOT_HELD = "what was found does not hold where it was not fitted"
 """What is said where a navigation without aid contradicts what was found."""
 OVER_MODELS = "one sigma over all models that the data leave open"
 """What a diagnosis states behind an amount: larger than that of one model where several are open."""
+TOO_LARGE = "+: too large without it"
+"""What the sign of an amount says."""
 _WHOLE_M = 10.0
 """Distance (m) from which metres have no decimals: a tenth of less is still seen."""
 
@@ -36,7 +38,7 @@ class Off:
 
     name: str
     amount: float
-    """By how much it is too large, in `unit`."""
+    """By how much it is too large without the effect, in `unit`: value without it less value with it."""
     unit: str
     sigma: float
     """Sigma of the better value, in `unit`: how well the amount is known."""
@@ -72,7 +74,10 @@ class Off:
 
 
 def coefficients_off(before: Calibration, after: Calibration) -> tuple[Off, ...]:
-    """Coefficients of a result that a better one puts elsewhere by more than chance, the worst first."""
+    """Coefficients of a result that a better one puts elsewhere by more than chance, the worst first.
+
+    Amounts are before less after, by how much the value before is too large; moves of a ladder have the other sign.
+    """
     units = dict(zip(before.names, before.display_units, strict=True))
     at = {name: k for k, name in enumerate(before.names)}
     out = []

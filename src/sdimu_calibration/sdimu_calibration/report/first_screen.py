@@ -24,7 +24,16 @@ from sdimu_calibration.core.plain_text import capital, first_of
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report.advice import Spell, advice_html
-from sdimu_calibration.report.cost import OVER_MODELS, InUse, Off, coefficients_off, in_use, metres, wrong_without
+from sdimu_calibration.report.cost import (
+    OVER_MODELS,
+    TOO_LARGE,
+    InUse,
+    Off,
+    coefficients_off,
+    in_use,
+    metres,
+    wrong_without,
+)
 from sdimu_calibration.report.effect_words import tip
 from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.markup import grid, prose, quiet, signs
@@ -172,7 +181,7 @@ def _off_table(worst: Sequence[Off], sigma: str = OVER_MODELS) -> str:
     if not worst:
         return ""
     rows = [[one.name, signs(one.better), signs(one.alone), one.unit, f"{abs(one.sigmas):.1f}"] for one in worst]
-    told = f"\N{PLUS-MINUS SIGN}: {sigma}."
+    told = f"{TOO_LARGE}; \N{PLUS-MINUS SIGN}: {sigma}."
     return grid(_OFF, rows, {0, 3}) + quiet(told)
 
 

@@ -57,7 +57,8 @@ def _ladder(summary: DiagnosisSummary) -> str:
         quiet(
             "Each model has its own fit. Held-out: every rest and the turn to it predicted from the others, in "
             "sigmas of the last model; 1 is right. Beyond noise: scatter of force, rate and turns in addition to white "
-            "noise; no data sheet specifies it for a sensor in a hand, so every fit learns it."
+            "noise; no data sheet specifies it for a sensor in a hand, so every fit learns it. Its log-likelihood is "
+            "the one with this scatter."
         ),
         *tried,
         quiet("Steps are in sigmas of the fit on which they were tried; the missing effect makes these larger.")

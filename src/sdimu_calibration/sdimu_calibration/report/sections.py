@@ -12,11 +12,13 @@ from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
 from sdimu_calibration.core.diagnosis.grades import NAMED, named, percents_of
-from sdimu_calibration.core.diagnosis.ladder import Rung
+from sdimu_calibration.core.diagnosis.ladder import Rung, figures_in_words
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.testable import WORST_SENSOR
+from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -106,12 +108,14 @@ _REFITS = (
 )
 
 
-def refits(rungs: Sequence[Rung]) -> str:
-    """Return the ladder of real refits; nothing when the model was not grown."""
+def refits(rungs: Sequence[Rung], noise: Sequence[NoiseTerm]) -> str:
+    """Return the ladder of real refits; nothing when the model was not grown. `noise`: that the diagnosis found."""
     if not rungs:
         return ""
     return grid(_REFITS, [_refit(rung) for rung in rungs], {0, 6, 7}) + quiet(
-        "Each model is fitted to the whole recording. Velocity after turns: RMS of the first second of each stop."
+        f"Each model is fitted to the whole recording. {capital(figures_in_words(rungs, noise))}. "
+        "Velocity after turns: RMS of the first second of each stop. Moved: value less that of the model above, in "
+        "sigmas of the latter."
     )
 
 
@@ -144,7 +148,7 @@ def step_row(step: Step) -> list[str]:
 
 def _told(step: Step) -> list[str]:
     moved = ", ".join(f"{name} by {size:+.1f}" for name, size in step.moved if abs(size) >= 0.5)
-    out = [f"{step.label}, while missing, pulled {moved} of the sigmas in white noise."] if moved else []
+    out = [f"{step.label}, once it is in the model, moves {moved} of the sigmas in white noise."] if moved else []
     if step.alike:
         out.append(f"These data cannot separate {step.label} from {', '.join(step.alike[:6])}.")
     return out
@@ -177,7 +181,7 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
             ),
         ),
         folded("Steps of the search", ladder(d)),
-        folded("Ladder of refits: one effect at a time", refits(d.rungs)) if d.rungs else "",
+        folded("Ladder of refits: one effect at a time", refits(d.rungs, d.found.noise)) if d.rungs else "",
         quiet(numbers(d)),
     )
 

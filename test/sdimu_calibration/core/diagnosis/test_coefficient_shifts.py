@@ -37,17 +37,18 @@ def test_nothing_hangs_on_a_choice_that_the_data_make(bench):
     assert one.coefficient_shifts == ()
 
 
-def test_a_step_says_how_wrong_the_coefficients_were_and_in_which_sense(diagnosis):
+def test_a_step_says_how_far_coefficients_move_in_the_sense_of_a_refit(diagnosis):
+    """After less before, as the ladder of refits says it."""
     (step,) = diagnosis.found.steps
     before, after = diagnosis.before, diagnosis.after
     sigma = before.conditional_sigma if before.conditional_sigma is not None else np.sqrt(np.diag(before.covariance))
-    wrong = {
-        name: (before.values[k] - after.values[after.names.index(name)]) / sigma[k]
+    moved = {
+        name: (after.values[after.names.index(name)] - before.values[k]) / sigma[k]
         for k, name in enumerate(before.names)
         if sigma[k] > 0.0
     }
-    told = [(name, size) for name, size in step.moved if abs(size) > 3.0 and name in wrong]
+    told = [(name, size) for name, size in step.moved if abs(size) > 3.0 and name in moved]
     assert told
     for name, size in told:
-        assert np.sign(size) == np.sign(wrong[name])
-        assert size == pytest.approx(wrong[name], rel=0.3)
+        assert np.sign(size) == np.sign(moved[name])
+        assert size == pytest.approx(moved[name], rel=0.3)

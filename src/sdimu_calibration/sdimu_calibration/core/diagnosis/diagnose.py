@@ -198,7 +198,7 @@ def climb(
     own = any(c.family == "own" for c in done.chosen)
     raised = alarms(done, after, consistency, base, stated, findings)
     noise += tuple(term_in_words(term) for term in done.found.noise if not is_stated(term, stated))
-    rungs = ladder(as_given, widened, done, progress) if refits or base.learns_scatter else ()
+    rungs = ladder(request, as_given, widened, done, progress) if refits or base.learns_scatter else ()
     word = verdict(_facts(done, any(f.grave for f in findings), bool(raised), own, bool(noise)))
     progress("done", 1.0)
     unspoken = Diagnosis(

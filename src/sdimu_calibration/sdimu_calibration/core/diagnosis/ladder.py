@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sdimu_calibration.core.diagnosis.ground import Request
 from sdimu_calibration.core.diagnosis.problem import Problem
+from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise
 from sdimu_calibration.core.error_figures import held_out, log_likelihood, nis
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.solve import extend
+from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.results import Calibration
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-    from sdimu_calibration.core.diagnosis.rounds import Round
 
 MOVED = 2.0
 """Change of a coefficient (sigma) from which it is listed: chance makes smaller ones."""
@@ -38,13 +41,14 @@ class Rung:
     log_bayes_factor: float
     nis_mean: float
     held_out_rms: float
-    """`log_likelihood`, `log_bayes_factor`, `nis_mean`, `held_out_rms`: Bayes factor against the rung before."""
+    """`log_likelihood`, `log_bayes_factor`, `nis_mean`, `held_out_rms`: likelihood in the noise that was found, Bayes
+    factor against the rung before, NIS and held-out error in white noise."""
     jump: float
     jump_velocity: float
     """`jump`, `jump_velocity`: after turns: RMS of the velocity innovation at the first epoch of each stop, over its
     sigma and in m/s; NaN where nothing is navigated."""
     moved: tuple[tuple[str, float], ...]
-    """Coefficients that moved against the rung before, in their sigmas, largest first."""
+    """Coefficients that moved: value less that of the rung before, in sigmas of the latter, largest first."""
     scatter: tuple[float, ...] | None = None
     """What a handheld fit learned beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle)."""
     fit: Fit | None = field(default=None, repr=False, compare=False)
@@ -56,11 +60,13 @@ class Rung:
         return f"+ {self.added}" if self.added else "model as given"
 
 
-def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:
-    """Fit the model with the first, the first two, ... of what a round chose.
+def ladder(request: Request, fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:
+    """Fit the model with the first, the first two, ... of what a round chose, all in the noise that it found.
 
     Parameters
     ----------
+    request : Request
+        Of the search.
     fit, final : Fit
         With the model as given, and with everything that was chosen.
     """
@@ -68,7 +74,9 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
     fits = [fit]
     for k in range(1, len(effects)):
         progress("refits", 0.9)
-        fits.append(extend(fit, effects[:k], progress=progress))
+        # In noise that it learned by itself its log-likelihood would not compare with the others.
+        wider = extend(fit, effects[:k], progress=progress, learn=False)
+        fits.append(in_found_noise(request, wider, done.found.noise))
     if effects:
         fits.append(final)
     results = [outcome(one, refuse=one is fits[-1]) for one in fits]
@@ -80,6 +88,16 @@ def ladder(fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung,
         added = done.chosen[k - 1].label if k else ""
         rungs.append(_rung(added, one, result, error, results[k - 1] if k else None, rungs[-1] if rungs else None))
     return tuple(rungs)
+
+
+def figures_in_words(rungs: Sequence[Rung], noise: Sequence[NoiseTerm]) -> str:
+    """Say in which noise the figures of a ladder are. `noise`: with a memory, that the diagnosis found."""
+    if any(rung.scatter is not None for rung in rungs):
+        return "log-likelihood: with the scatter that each model learned; held-out: in sigmas of the last model"
+    if not noise:
+        return "log-likelihood, nis and held-out: in white noise"
+    found = ", ".join(dict.fromkeys(term.words for term in noise))
+    return f"log-likelihood: of every model in the noise that was found ({found}); nis and held-out: in white noise"
 
 
 def error_ladder(d: Diagnosis) -> list[tuple[str, float]]:
@@ -138,7 +156,10 @@ def jump(fit: Fit) -> tuple[float, float]:
 
 
 def moved_coefficients(earlier: Calibration, later: Calibration, least: float = MOVED) -> tuple[tuple[str, float], ...]:
-    """Coefficients of both results that differ by more than `least` of the earlier sigma, largest first."""
+    """Coefficients of both results that differ by more than `least` of the earlier sigma, largest first.
+
+    Later less earlier: positive where a value grows as the model does.
+    """
     index = {name: k for k, name in enumerate(later.names)}
     out = []
     for k, name in enumerate(earlier.names):

@@ -37,7 +37,8 @@ class Step:
     alike: tuple[str, ...]
     """Labels of candidates that the data cannot tell from it."""
     moved: tuple[tuple[str, float], ...] = field(default=())
-    """Coefficients of the model that were most wrong while it was missing: their errors, in their own sigmas."""
+    """Coefficients of the model that move most when it is added: value with it less value without, in their sigmas
+    without it."""
 
 
 def step_of(
@@ -93,13 +94,13 @@ def step_of(
 
 
 def _moved(problem: Problem[E], chosen: Sequence[int], best: int, size: float) -> tuple[tuple[str, float], ...]:
-    """Errors of the coefficients, in their own sigmas, while the effect was missing: the largest."""
+    """Largest moves of coefficients when the effect is added: after less before, in their sigmas before."""
     known, weight, _ = problem.known(chosen)
     J = problem.evidence.information.J
     A = J[np.ix_(known, known)] + np.diag(weight)
     unit = 1.0 / np.sqrt(np.diag(A))
     inverse = np.linalg.inv(A * np.outer(unit, unit)) * np.outer(unit, unit)
-    change = inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
+    change = -inverse @ J[known, best] * size / np.sqrt(np.diag(inverse))
     # Neither attitudes nor the like, which only serve: coefficients of the model, and what was chosen before.
     told = [*range(problem.evidence.coefficients), *range(problem.p, len(known))]
     order = sorted(told, key=lambda i: -abs(change[i]))[:4]
