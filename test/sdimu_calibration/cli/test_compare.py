@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,11 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sdimu_calibration.api.comparison import Comparison
 from sdimu_calibration.cli import main as cli
 from sdimu_calibration.cli.calibrate import _other_temperature
 from sdimu_calibration.core.diagnosis.ladder import moved_coefficients
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.results import START_TEMPERATURE, Calibration, History, Rest
+from sdimu_calibration.core.results import START_TEMPERATURE, Calibration, History, Rest, no_history
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.comparison import comparison, headings
 from sdimu_calibration.storage.files.result_file import write_result
@@ -51,12 +53,12 @@ SECOND = replace(
 
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
-    def compare(*results):
+    def compare(*results, more=()):
         folders = []
         for k, result in enumerate(results):
             write_result(tmp_path / f"run{k}" / "result.json", result)
             folders.append(str(tmp_path / f"run{k}"))
-        monkeypatch.setattr(sys, "argv", ["sdimu", "compare", *folders])
+        monkeypatch.setattr(sys, "argv", ["sdimu", "compare", *folders, *more])
         monkeypatch.setenv("COLUMNS", "200")
         with pytest.raises(SystemExit) as ending:
             cli.main()
@@ -80,6 +82,41 @@ def test_it_is_said_of_what_the_sigmas_behind_amounts_are(run):
     told = "one sigma if the model of the line is right; of a diagnosis, one sigma over all models that the data leave"
     assert told in run(FIRST, SECOND)[1]
     assert told not in run(FIRST, replace(SECOND, values=FIRST.values))[1]
+
+
+LARGER = replace(
+    SECOND,
+    names=(*FIRST.names, "accel_quadratic_x"),
+    units=(*FIRST.units, "m/s^2/g^2"),
+    display_units=(*FIRST.display_units, "ug/g^2"),
+    values=np.array([1e-4 + 5e-6, 2e-4, 1e-6]),
+    covariance=np.diag([1e-12, 4e-12, 1e-16]),
+    history=no_history(3),
+)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_simplest_model_is_first_in_whatever_order_they_are_named(run, turned):
+    """The larger model named first was called the one without an effect, whose biases are wrong."""
+    _, out, _ = run(*((LARGER, FIRST) if turned else (FIRST, LARGER)))
+    small, large = (next(text for text in out.splitlines() if name in text) for name in (" 1 effect ", "+60.0"))
+    assert out.index(small) < out.index(large)
+    assert "run1" in (small if turned else large)
+    assert "+ accel_quadratic_x" in large
+    assert "accel_bias_x -0.5" in large
+    assert ("models stand in the order of their numbers of coefficients" in out) == turned
+    # In Python, too.
+    shown = Comparison([SimpleNamespace(result=one) for one in ((LARGER, FIRST) if turned else (FIRST, LARGER))])
+    assert [row[0] for row in shown.rows] == (["model 2", "model 1"] if turned else ["model 1", "model 2"])
+
+
+def test_what_is_wrong_without_an_effect_has_a_sign_that_is_explained_and_keys(run):
+    assert "wrong without it: coefficients of the model above; +: too large without it" in run(FIRST, LARGER)[1]
+    content = json.loads(run(FIRST, LARGER, more=["--json"])[1])
+    assert content["models"][0]["wrong_without_it"] == []
+    (one,) = content["models"][1]["wrong_without_it"]
+    assert (one["coefficient"], one["unit"], one["display_unit"]) == ("accel_bias_x", "m/s^2", "ug")
+    assert [one[key] for key in ("amount", "sigma", "sigmas")] == [pytest.approx(v) for v in (-5e-6, 1e-6, -5.0)]
 
 
 def test_movement_counts_in_sigmas_of_the_model_before():
@@ -157,7 +194,10 @@ def test_errors_in_white_noise_are_said_to_be_that_beside_the_one_in_learned_noi
     after = next(text for text in out.splitlines() if "run1" in text)
     assert "held-out 1.076" in after
     assert "nis and held-out: in white noise" in out
-    assert "white noise" not in run(FIRST, SECOND)[1]
+    assert "log-likelihood: of each model in the noise that it learned itself" in out
+    alone = run(FIRST, SECOND)[1]
+    assert "log-likelihood, nis and held-out: in the white noise of the IMU's file" in alone
+    assert "learned" not in alone
 
 
 def test_one_folder_is_not_enough(run):

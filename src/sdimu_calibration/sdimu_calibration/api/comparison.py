@@ -8,7 +8,7 @@ from html import escape
 from rich.table import Table
 
 from sdimu_calibration.api.fit import CalibrationFit
-from sdimu_calibration.report.comparison import comparison, headings, remarks
+from sdimu_calibration.report.comparison import comparison, headings, remarks, simplest_first
 from sdimu_calibration.report.table import as_text
 
 _WIDTH = 140
@@ -21,7 +21,7 @@ class Comparison:
     Attributes
     ----------
     rows : list of list of str
-        One a model, in the order of `headings`.
+        One a model, in the order of `headings`; the model with the fewest coefficients first.
     headings : tuple of str
         Model, noise learned (where any was), log-likelihood, difference to the one before, NIS, held-out error,
         coefficients that moved.
@@ -30,9 +30,10 @@ class Comparison:
     """
 
     def __init__(self, fits: Sequence[CalibrationFit]) -> None:
-        results = [fit.result for fit in fits]
-        self.rows = comparison([f"model {k}" for k in range(1, len(fits) + 1)], results)
-        self.headings, self.remarks = headings(results), remarks(results)
+        order = simplest_first([fit.result for fit in fits])
+        results = [fits[k].result for k in order]
+        self.rows = comparison([f"model {k + 1}" for k in order], results)
+        self.headings, self.remarks = headings(results), remarks(results, order)
 
     def __repr__(self) -> str:
         """Table of the models."""

@@ -14,10 +14,11 @@ from sdimu_calibration.core.error_figures import (
     nis,
     noise_learned,
 )
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
-from sdimu_calibration.report.cost import OVER_MODELS, coefficients_off
+from sdimu_calibration.report.cost import OVER_MODELS, TOO_LARGE, coefficients_off
 
 _HEADINGS = ("name", "model", "log-likelihood", "difference", "nis", "held-out", "wrong without it")
 _NOISE = "noise learned"
@@ -25,14 +26,21 @@ _OTHER_STOPS = "the results leave out different stops: their log-likelihoods and
 _OTHER_SCALE = "not with one site and one noise specification: log-likelihoods and NIS are of different scales"
 _BY_HAND = (
     "held-out: the force of each rest by hand predicted from everything else, in sigmas of the last model; every model "
-    "learns a scatter of its own, in which its NIS and its own held-out error are near 1"
+    "learns a scatter of its own, in which its log-likelihood is, and its NIS and its own held-out error are near 1"
 )
 _TWO_KINDS = "some by hand and some navigated: neither log-likelihoods nor held-out errors compare"
+_IN_FILE = "log-likelihood, nis and held-out: in the white noise of the IMU's file"
+_IN_OWN = (
+    "log-likelihood: of each model in the noise that it learned itself; the ladder of refits of a diagnosis has all of "
+    "its models in one noise, that which the diagnosis found, so its numbers are others"
+)
 _IN_WHITE = (
     "nis and held-out: in white noise, in which models compare; where noise was learned, 1 is "
     "right for the error in that noise"
 )
 _SIGMAS = f"+-: one sigma if the model of the line is right; of a diagnosis, {OVER_MODELS}"
+_OFF_SIGN = f"wrong without it: coefficients of the model above; {TOO_LARGE}"
+_REORDERED = "models stand in the order of their numbers of coefficients, the simplest first, not as they were named"
 _MOST_MOVED = 6
 
 
@@ -45,7 +53,7 @@ def headings(results: Sequence[Calibration]) -> tuple[str, ...]:
 def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[list[str]]:
     """Rows of `headings`, one a result, each against the one before it.
 
-    `results`: of one recording, the simplest model first.
+    `results`: of one recording, in the order of `simplest_first`.
     """
     if len(results) < 2:
         raise DataError("compare: give at least two results of one recording")
@@ -58,14 +66,21 @@ def comparison(names: Sequence[str], results: Sequence[Calibration]) -> list[lis
     return lines
 
 
-def remarks(results: Sequence[Calibration]) -> tuple[str, ...]:
-    """Say what the columns mean and where they do not compare, one line each."""
+def simplest_first(results: Sequence[Calibration]) -> list[int]:
+    """Places of results by the number of their coefficients; those with as many as another stay in their order."""
+    return sorted(range(len(results)), key=lambda k: len(results[k].names))
+
+
+def remarks(results: Sequence[Calibration], named: Sequence[int]) -> tuple[str, ...]:
+    """Say what the columns mean and where they do not compare, one line each. `named`: as `simplest_first` gave it."""
     handheld = [is_handheld(result) for result in results]
+    learned = any(map(noise_learned, results))
     return (
+        *([_REORDERED] if list(named) != sorted(named) else []),
         *([_OTHER_STOPS] if any(_differ(result, results[0], "stops") for result in results[1:]) else []),
         *([_OTHER_SCALE] if any(_differ(result, results[0], "conditions") for result in results[1:]) else []),
-        *([_IN_WHITE] if any(map(noise_learned, results)) else []),
-        *([_SIGMAS] if any(coefficients_off(*two) for two in pairwise(results)) else []),
+        *([_IN_OWN, _IN_WHITE] if learned else [] if any(handheld) else [_IN_FILE]),
+        *([_OFF_SIGN, _SIGMAS] if any(coefficients_off(*two) for two in pairwise(results)) else []),
         *([_BY_HAND] if all(handheld) else [_TWO_KINDS] if any(handheld) else []),
     )
 
@@ -99,7 +114,7 @@ def _row(name: str, result: Calibration, before: Calibration | None, held_out: f
     # Of a set it lacks what its recordings hold of their own, and each model stands in a noise of its own.
     likelihood = float("nan") if result.of_set is not None else log_likelihood(result)
     if before is None:
-        model, difference, moved = f"{len(result.model)} effects", "", ""
+        model, difference, moved = counted(len(result.model), "effect"), "", ""
     else:
         model = _change(before.model, result.model)
         gain = likelihood - log_likelihood(before)
