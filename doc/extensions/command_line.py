@@ -15,7 +15,8 @@ HEAD = """# Command line
 
 Made from the program at each build; `sdimu VERB --help` says the same. Exit status: 0 done, 1 data or options are
 unusable (one line on stderr), 2 usage, 3 done, but the estimate is not to be trusted (stderr says why): the data have a
-fault, `calibrate` notes that the model does not fit, or the verdict of `diagnose` is `unexplained` or `data fault`.
+fault, `calibrate` notes that the model does not fit, or the verdict of `diagnose` is `unexplained` or `data fault`;
+or a limit of `datasheet` does not pass.
 """
 
 

@@ -9,13 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import typer
 
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.core.fleet.datasheet import known_terms
 from sdimu_calibration.core.noise import Terms
 from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.recording import DataError
-from sdimu_calibration.core.units import to_si
+from sdimu_calibration.core.units import from_si, to_si
+from sdimu_calibration.report.fleet.tables import three
 from sdimu_calibration.storage.files.limits_file import read_limits
 from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms, write_noise_terms
 from sdimu_calibration.storage.files.result_file import read_result, write_result
@@ -32,7 +34,9 @@ def test_limits_are_judged_in_the_file_on_the_page_and_in_the_terminal(batch, tm
         "format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n  gyro scale-factor error: 1 ppm\n"
         "  gyro scale-factor asymmetry: 10 ppm\n"
     )
-    datasheet([folder], limits=limits)
+    with pytest.raises(typer.Exit) as ending:
+        datasheet([folder], limits=limits)
+    assert ending.value.exit_code == 3
     lines = written(folder)
     assert lines["gyro bias"]["verdict"] == "pass"
     assert lines["gyro bias"]["limit"] == pytest.approx(to_si(100, "deg/h"))
@@ -53,9 +57,13 @@ def test_limits_are_judged_in_the_file_on_the_page_and_in_the_terminal(batch, tm
         True
     ] * 3
     assert "size: A4" in page
-    told = capsys.readouterr().out
-    assert "pass" in told
-    assert "fail" in told
+    told = capsys.readouterr()
+    assert "pass" in told.out
+    assert "fail" in told.out
+    # A production line sees it by the status, and reads which limits.
+    first, second = told.err.splitlines()
+    assert re.fullmatch(r"sdimu: limit: fail: gyro scale-factor error: [\d.]+ ppm \(limit 1\)", first)
+    assert second == "sdimu: limit: not measured: gyro scale-factor asymmetry: limit 10 ppm"
 
 
 def test_a_sheet_that_is_held_against_nothing_has_no_column_for_it(batch, tmp_path):
@@ -128,6 +136,55 @@ def test_noise_of_a_recording_at_rest_comes_back_and_into_the_sheet(batch):
     datasheet([folder])
     line = written(folder)["gyro angle random walk"]
     assert line["low"] < line["value"] == 2e-7 < line["high"]
+
+
+def noise_of(path, source, serial="", seen=True):
+    """A noise.json of a recording of a unit; of all terms the white noise alone, or nothing at all, is seen."""
+    value = np.array([0.0, 2e-7 if seen else 0.0, 0.0, 0.0])
+    one = Terms(value, np.array([1e-9, 2e-9, 1e-8, 1e-10]))
+    terms = {f"{triad}_{axis}": one for triad in ("gyro", "accel") for axis in "xyz"}
+    write_noise_terms(path / "noise.json", source, 60.0, terms, Origin(serial, imu="dtg", recording=source))
+    return path
+
+
+def test_noise_of_another_unit_is_refused_and_that_of_another_recording_told(batch, tmp_path, capsys):
+    """Its angle random walk was held against the limits of this unit without a word."""
+    folder = batch(units=2)
+    other = noise_of(tmp_path / "other", "still", "SN7")
+    with pytest.raises(DataError, match=r"noise of the unit with serial number SN7, and the results are of SN0, SN1"):
+        datasheet([folder], noise=[other])
+    capsys.readouterr()
+    datasheet([folder], noise=[noise_of(tmp_path / "own", "still", "SN1")])
+    assert "note: noise is of another recording than the results: still (serial SN1)" in capsys.readouterr().out
+    datasheet([folder], noise=[noise_of(tmp_path / "nobody", "still")])
+    assert "recording than the results: still (unit not stated)" in capsys.readouterr().out
+    recording = read_result(folder / "unit1_0").origin.recording
+    datasheet([folder], noise=[noise_of(tmp_path / "same", recording, "SN1")])
+    assert "another recording" not in capsys.readouterr().out
+
+
+def test_noise_of_another_unit_below_the_folder_is_set_apart(batch, capsys):
+    folder = batch(units=2)
+    noise_of(folder / "unit0_0", "still", "SN0")
+    datasheet([folder], serial="SN1")
+    assert "set apart: " in (told := capsys.readouterr().out)
+    assert "noise of the unit with serial number SN0, and the results are of SN1" in told
+    assert written(folder)["gyro angle random walk"]["value"] is None
+
+
+def test_what_was_not_seen_is_given_as_a_bound(batch, tmp_path, capsys, monkeypatch):
+    """As `sdimu noise` gives it: 0, 0 to 0.03 read as a sensor without any."""
+    monkeypatch.setenv("COLUMNS", "140")
+    folder = batch(units=1)
+    limits = tmp_path / "limits.yaml"
+    limits.write_text("limits:\n  gyro bias in-run stability: 1 deg/h\n")
+    datasheet([folder], noise=[noise_of(tmp_path / "still", "still")], limits=limits)
+    high = f"< {three(from_si(written(folder)['gyro bias in-run stability']['high'], 'deg/h'))}"
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if "gyro bias in-run stability" in one]
+    assert re.search(rf"in-run stability +{high} +deg/h ", line)
+    page = (folder / "datasheet.html").read_text()
+    assert f"gyro bias in-run stability: &lt; {high[2:]} deg/h (limit 1)" in page
+    assert f'<td class="number">&lt; {high[2:]}</td><td class="number"></td>' in page
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.bags.bag_reader import read_recording
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.noise_terms_file import read_noise_terms
 
 DT = 0.02
 GYRO, ACCEL = to_si(3.0, "deg/h/sqrt(Hz)"), to_si(50.0, "ug/sqrt(Hz)")
@@ -45,6 +46,11 @@ def test_the_file_written_is_an_imu_with_the_noise_of_the_recording(still: Path,
     assert found.gyro_white_noise == pytest.approx(GYRO, rel=0.1)
     assert found.accel_white_noise == pytest.approx(ACCEL, rel=0.1)
     assert found.prior == base.prior
+    # Of which unit, IMU and day it is, as result.json has it: a data sheet takes it for that unit alone.
+    origin = read_noise_terms(tmp_path / "out").origin
+    assert (origin.serial, origin.imu, origin.recording, origin.start_ns > 0) == ("", "dtg", "still", True)
+    noise(still, imu="dtg", serial="SN1", out=tmp_path / "out")
+    assert read_noise_terms(tmp_path / "out").origin.serial == "SN1"
     page = (tmp_path / "out" / "noise.html").read_text()
     assert "white noise" in page
     assert "plotly" in page

@@ -100,7 +100,8 @@ app = typer.Typer(
     name="sdimu",
     cls=Verbs,
     help="Calibrate a strapdown inertial measurement unit on a rate table at navigation level.",
-    epilog="Exit status: 0 done, 1 data or options are unusable, 2 wrong usage, 3 done, but not to be trusted.",
+    epilog="Exit status: 0 done, 1 data or options are unusable, 2 wrong usage, 3 done, but not to be trusted, or "
+    "a limit does not pass.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

@@ -11,7 +11,7 @@ import typer
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.opened import default_folder
 from sdimu_calibration.cli.option_groups import with_options
-from sdimu_calibration.cli.options import BagArgument, JsonOption, Recorded, results_in
+from sdimu_calibration.cli.options import BagArgument, JsonOption, Recorded, SerialOption, results_in
 from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.units import from_si
@@ -35,18 +35,20 @@ def noise(
     opening: Recorded,
     longest: Annotated[bool, typer.Option("--longest", help="The longest rest alone, not all of them.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws behind the standard errors.")] = 1,
+    serial: SerialOption = None,
     out: Annotated[Path | None, results_in("results; BAG_noise")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the noise terms from the rests of a recording; leaves noise.html, noise.json, imu.yaml for --imu."""
     from sdimu_calibration.core.noise import rests, white_noise
+    from sdimu_calibration.core.origin import measured as measured_origin
     from sdimu_calibration.report.noise import HEAD, misfits, no_rest, write_page
     from sdimu_calibration.report.noise import rows as listed
     from sdimu_calibration.storage.bags.file_room import check_own_file
     from sdimu_calibration.storage.files.config import find_config, load_imu, load_site
     from sdimu_calibration.storage.files.imu_file import write_measured_imu
     from sdimu_calibration.storage.files.noise_terms_file import write_noise_terms
-    from sdimu_calibration.storage.opening import open_recording
+    from sdimu_calibration.storage.opening import open_recording, said_of
 
     # Errors in files are reported before the work.
     folder = out or default_folder(bag, "noise")
@@ -75,7 +77,8 @@ def noise(
     ]
     place = [] if opening.site is None else ["--site", opening.site]
     with written_together(folder) as part:
-        write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms)
+        origin = measured_origin(said_of(bag, opening.site or ""), recording, load_imu(imu).name)
+        write_noise_terms(part / "noise.json", bag.resolve().name, seconds, terms, origin.stated(serial, None))
         write_page(part / "noise.html", deviations, terms, f"Noise of {bag.name}", words)
         write_measured_imu(part / "imu.yaml", imu, measured, terms, _head(bag, words[0], no_rest(terms)))
     print_table(console, HEAD, listed(terms), "terms of the Allan deviation, one sigma", left=2)

@@ -43,6 +43,9 @@ OwnEffectOption = Annotated[
     list[str] | None,
     typer.Option(metavar="FILE", help="Effect of your own (YAML) that the result has; may be repeated."),
 ]
+SerialOption = Annotated[
+    str | None, typer.Option(metavar="NUMBER", help="Serial number of the unit; taken from the bag where it says it.")
+]
 SetOption = Annotated[
     Path | None,
     typer.Option("--set", metavar="FILE", help="Set of recordings (sdimu set init).", rich_help_panel=_OF_SETS),
@@ -154,10 +157,7 @@ class Stated(Place):
     exclude_times: Annotated[
         str | None, typer.Option(metavar="SPANS", help="Spans of s in which nothing is measured: 812-815,900-910.")
     ] = None
-    serial: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBER", help="Serial number of the unit; taken from the bag where it says it."),
-    ] = None
+    serial: SerialOption = None
     power_on: Annotated[
         str | None,
         typer.Option(

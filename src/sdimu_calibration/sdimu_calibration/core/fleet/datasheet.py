@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.fleet.reml import LEVEL, RandomEffect, random_effect
 from sdimu_calibration.core.fleet.sheet import Line
 from sdimu_calibration.core.noise import Terms
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.probability import normal_limit, student_limit
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -47,6 +48,10 @@ class NoiseOfUnit:
     """By channel, such as ``gyro_x``, SI."""
     stated: Mapping[tuple[str, str], float] = field(default_factory=dict)
     """Sizes that a file states without their errors (SI), by triad and term."""
+    origin: Origin = field(default_factory=Origin)
+    """Unit, IMU and date of the recording, as far as they are known."""
+    path: str = ""
+    """Of the file that it was read from."""
 
 
 def known_terms() -> dict[str, str]:

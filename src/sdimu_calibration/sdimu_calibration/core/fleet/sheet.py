@@ -40,6 +40,11 @@ class Line:
     """Largest size allowed (SI); NaN without a limit."""
 
     @property
+    def is_bound(self) -> bool:
+        """Whether nothing was seen of it, so that only the upper end of its interval is known."""
+        return self.value == 0.0 and math.isfinite(self.high) and self.high > 0.0
+
+    @property
     def verdict(self) -> str:
         """Say whether the limit is kept: only if the whole interval is inside; empty without a limit."""
         if math.isnan(self.limit):

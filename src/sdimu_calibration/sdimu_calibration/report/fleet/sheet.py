@@ -47,6 +47,8 @@ def _row(line: Line) -> list[str]:
     unit = line.display_unit
     bounds = f"{_size(line.low, unit)}..{_size(line.high, unit)}" if math.isfinite(line.high) else ""
     value = _size(line.value, unit) if math.isfinite(line.value) else ""
+    if line.is_bound:
+        value, bounds = f"< {_size(line.high, unit)}", ""
     limit = _size(line.limit, unit) if math.isfinite(line.limit) else ""
     return [line.term, value, bounds, unit, str(line.recordings or ""), limit, line.verdict]
 
@@ -130,14 +132,16 @@ def _verdict(lines: Sequence[Line]) -> str:
     return f'<div class="verdict {"bad" if bad else "good"}">{head}<ul class="limits">{rows}</ul></div>'
 
 
+def against_limit(line: Line) -> str:
+    """Say what was measured beside what is allowed: ``gyro bias: 12 deg/h (limit 10)``."""
+    _, value, _, unit, _, limit, _ = _row(line)
+    return f"{line.term}: {f'{value} {unit} (limit {limit})' if value else f'limit {limit} {unit}'}"
+
+
 def _limit(line: Line) -> str:
-    """Return an item of the list of limits: what was measured beside what is allowed."""
-    unit, limit = line.display_unit, _size(line.limit, line.display_unit)
-    value = (
-        f"{_size(line.value, unit)} {unit} (limit {limit})" if math.isfinite(line.value) else f"limit {limit} {unit}"
-    )
+    """Return an item of the list of limits."""
     kind = line.verdict.split(" ")[0]
-    return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(f"{line.term}: {value}")}</li>'
+    return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(against_limit(line))}</li>'
 
 
 _JUDGED = ("limit", "verdict")
@@ -170,7 +174,7 @@ def _table(lines: Sequence[Line]) -> str:
 
 def _line(line: Line, triad: str, judged: bool) -> str:
     _, value, bounds, unit, number, limit, verdict = _row(line)
-    rms = _size(line.rms, line.display_unit) if math.isfinite(line.rms) else ""
+    rms = _size(line.rms, line.display_unit) if math.isfinite(line.rms) and not line.is_bound else ""
     how = "; ".join(word for word in (line.of, line.method, line.condition, line.missing) if word)
     texts = [
         (line.term.removeprefix(f"{triad} "), "text"),

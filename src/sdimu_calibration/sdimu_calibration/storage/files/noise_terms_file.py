@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
 from sdimu_calibration.core.fleet.datasheet import NoiseOfUnit
 from sdimu_calibration.core.noise import TERMS, Terms
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.result_file import ORIGIN
 from sdimu_calibration.storage.files.result_model import Array, Line, Number, ResultModel, complete, read_model
 
 FORMAT: Final = "sdimu-noise-terms/1"
@@ -36,12 +38,15 @@ class NoiseTermsFile(ResultModel):
 
     format: Literal["sdimu-noise-terms/1"] = FORMAT
     recording: Line
+    origin: Annotated[Origin, ORIGIN] = Origin()
     duration_s: Number = np.nan
     terms: tuple[Line, ...] = TERMS
     channels: dict[str, Channel]
 
 
-def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapping[str, Terms]) -> None:
+def write_noise_terms(
+    path: Path, recording: str, duration_s: float, terms: Mapping[str, Terms], origin: Origin | None = None
+) -> None:
     """Write noise.json.
 
     Parameters
@@ -52,10 +57,13 @@ def write_noise_terms(path: Path, recording: str, duration_s: float, terms: Mapp
         Length of all rests (s).
     terms : mapping of str to Terms
         By channel.
+    origin : Origin, optional
+        Unit, IMU and date, as far as they are known.
     """
     NoiseTermsFile.model_construct(
         format=FORMAT,
         recording=recording,
+        origin=origin or Origin(recording=recording),
         duration_s=duration_s,
         terms=TERMS,
         channels={
@@ -73,7 +81,8 @@ def read_noise_terms(path: Path) -> NoiseOfUnit:
     path = path / NAME if path.is_dir() else path
     file = read_model(path, NoiseTermsFile)
     with complete(path, FORMAT):
-        return NoiseOfUnit(file.recording, {channel: one.terms for channel, one in file.channels.items()})
+        terms = {channel: one.terms for channel, one in file.channels.items()}
+        return NoiseOfUnit(file.recording, terms, origin=file.origin, path=str(path))
 
 
 def _stated(path: Path) -> NoiseOfUnit:
