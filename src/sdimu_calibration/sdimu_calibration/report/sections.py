@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 
 from sdimu_calibration.core.advice import Kind
+from sdimu_calibration.core.diagnosis.advice import Untestable
 from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.diagnosis.found import Found
@@ -405,18 +406,24 @@ def separation(calibration: Calibration, draw: Draw) -> str:
 _SMALLEST = ("effect", "smallest that would be found", "unit", "usual size", "share of signature left", "testable here")
 
 
-def smallest(entries: Sequence[data.Scored], assumed: Sequence[Assumed] = ()) -> str:
-    """Return the minimal detectable sizes: what this test could have seen, the worst axis of each effect."""
+def smallest(
+    entries: Sequence[data.Scored], assumed: Sequence[Assumed] = (), untestable: Sequence[Untestable] = ()
+) -> str:
+    """Return the minimal detectable sizes: what this test could have seen, the worst axis of each effect.
+
+    `untestable`: why effects could not have been seen.
+    """
     worst: dict[str, data.Scored] = {}
     for entry in entries:
         if entry.family != "own" and entry.smallest >= worst.get(entry.family, entry).smallest:
             worst[entry.family] = entry
     order = sorted(worst.values(), key=lambda e: (np.isfinite(e.smallest), -e.smallest / e.prior))
-    rows = [_seen(entry) for entry in order]
-    untestable = sum(row[-1] != "yes" for row in rows)
+    why = {label: group.reason for group in untestable for label in group.labels}
+    rows = [_seen(entry, why) for entry in order]
+    unseen = sum(row[-1] != "yes" for row in rows)
     return section(
         "What could have been seen",
-        f"<p>Of {len(rows)} effects, {untestable} could not have been seen on every axis at their usual size.</p>",
+        f"<p>Of {len(rows)} effects, {unseen} could not have been seen on every axis at their usual size.</p>",
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         _taken_for_granted(assumed),
         quiet(
@@ -451,13 +458,11 @@ def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
     return f"<p>{told}</p>{table}"
 
 
-def _seen(entry: data.Scored) -> list[str]:
-    if not np.isfinite(entry.smallest):
-        size, answer = "", "no: the model's coefficients take all of it"
-    else:
-        size = f"{entry.smallest:.3g}"
-        answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
-        if entry.smallest > WORST_SENSOR * entry.prior:
-            size, answer = "", "no: at no size that a sensor has"
+def _seen(entry: data.Scored, why: Mapping[str, str]) -> list[str]:
+    """Return a row of `_SMALLEST`. `why`: reasons by label, those that the terminal and diagnosis.json give."""
+    size = f"{entry.smallest:.3g}"
+    answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
+    if not np.isfinite(entry.smallest) or entry.smallest > WORST_SENSOR * entry.prior:
+        size, answer = "", ": ".join(word for word in ("no", why.get(entry.label, "")) if word)
     usual = f"{entry.prior:.3g}" if np.isfinite(entry.prior) else ""
     return [entry.label, size, entry.unit, usual, f"{100 * entry.retention:.1f} %", answer]
