@@ -136,8 +136,10 @@ def test_matplotlib_draws_a_diagnosis_in_the_same_colours(found):
     pytest.importorskip("matplotlib")
     assert [axes.get_xlabel() for axes in found.plot_heat_map(library="matplotlib").axes][-1] == "stop"
     assert found.plot_ranking(library="matplotlib").axes[0].get_xlabel() == "score |z| (sigma)"
-    with pytest.raises(DataError, match="expected 'plotly' or 'matplotlib'"):
+    with pytest.raises(DataError, match=r"expected 'plotly' or 'matplotlib'$"):
         found.plot_ranking(library="bokeh")
+    with pytest.raises(DataError, match=r"did you mean 'matplotlib'\?"):
+        found.plot_ranking(library="matplot")
 
 
 def test_files_are_those_of_the_verbs(fit, found, tmp_path):

@@ -200,6 +200,22 @@ def test_errors_in_white_noise_are_said_to_be_that_beside_the_one_in_learned_noi
     assert "learned" not in alone
 
 
+@pytest.mark.parametrize(
+    ("name", "text"), [("report.html", "<html>"), ("plan.yaml", "a: 1"), ("a.json", '{"format": "sdimu-fleet/1"}')]
+)
+def test_a_file_that_is_no_result_is_named_with_what_is_expected(tmp_path, monkeypatch, capsys, name, text):
+    """A page was called no JSON file, with the place where Python stopped to read it."""
+    write_result(tmp_path / "one" / "result.json", FIRST)
+    (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sys, "argv", ["sdimu", "compare", str(tmp_path / "one"), str(tmp_path / name)])
+    with pytest.raises(SystemExit):
+        cli.main()
+    err = capsys.readouterr().err
+    assert err.startswith(f"sdimu: {tmp_path / name}: ")
+    assert "compare takes folders with a result.json" in err
+    assert "Expecting value" not in err
+
+
 def test_one_folder_is_not_enough(run):
     status, _, err = run(FIRST)
     assert status == 1

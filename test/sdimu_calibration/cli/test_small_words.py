@@ -20,7 +20,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
 from sdimu_calibration.report.live_text import size
 from sdimu_calibration.report.noise import rows
-from sdimu_calibration.storage.files.config import find_config
+from sdimu_calibration.storage.files.config import find_config, names_of
 
 
 @pytest.fixture
@@ -118,6 +118,23 @@ def test_the_readme_states_the_least_python_of_the_packages():
     (least,) = re.findall(r"Python (3\.\d+) to", (root / "README.md").read_text())
     for setup in [*root.glob("src/*/setup.py"), root / "study" / "setup.py"]:
         assert f'python_requires=">={least}"' in setup.read_text(), setup
+
+
+@pytest.mark.parametrize("kind", ["imu", "site", "plan", "model", "goal"])
+def test_a_name_that_is_none_names_the_one_that_looks_like_it(kind):
+    known = names_of(kind)[0]
+    with pytest.raises(DataError, match=rf"no {kind} named '{known}g' \(did you mean '{known}'\? There are: "):
+        find_config(kind, f"{known}g")
+
+
+@pytest.mark.parametrize(("name", "other"), [("gyro", "ug"), ("accel", "deg/h")])
+@pytest.mark.parametrize("effect", ["bias_ramp", "bias_warm_up", "bias_settling", "creep", "bias_temperature"])
+def test_typical_sizes_are_of_the_sensor_that_is_shown(sdimu, name, other, effect):
+    """A ramp of a gyro was said to be 1 to 20 ug/h in an accelerometer."""
+    out = sdimu("effects", f"{name}_{effect}_y")
+    typical = [line for line in out.splitlines() if line.startswith("typical: ")]
+    assert not any(other in line or "accelerometer" in line for line in typical)
+    assert typical or (name, effect) == ("gyro", "bias_ramp")
 
 
 def test_a_verb_that_is_none_names_those_that_look_like_it(monkeypatch, capsys):

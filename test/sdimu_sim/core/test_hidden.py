@@ -164,6 +164,7 @@ def test_delays_add_up_by_sensor():
         ("gyro_lost_data=10 ms; turn=0", "turns count from 1"),
         ("gyro_x=wq", "unknown variable 'wq'"),
         ("zzz=1", "unknown effect 'zzz'"),
+        ("accel_quadratic=25 ug/g^2", "several coefficients.*accel_quadratic_x, accel_quadratic_y, accel_quadratic_z"),
     ],
 )
 def test_a_wrong_effect_gives_one_line_with_its_name(text, message):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
@@ -25,7 +26,9 @@ def drawn(library: Library, made: Callable[[], Figure], picture: str, diagnosis:
     if library == "plotly":
         return made().as_plotly()
     if library != "matplotlib":
-        raise DataError(f"library {printable(str(library))!r}: expected 'plotly' or 'matplotlib'")
+        near = get_close_matches(str(library), ("plotly", "matplotlib"), n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        raise DataError(f"library {printable(str(library))!r}: expected 'plotly' or 'matplotlib'{hint}")
     # It loads matplotlib, which is optional.
     pictures = needed("sdimu_calibration.report.pictures")
     with pictures.mpl.rc_context(pictures.STYLE):

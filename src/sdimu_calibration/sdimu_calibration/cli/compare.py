@@ -16,17 +16,19 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.results import Calibration
 
 
+_EXPECTED = "compare takes folders with a result.json, as sdimu calibrate and sdimu diagnose leave it, or these files"
+
+
 def compare(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR DIR ...", help="Folders with result.json.")],
     as_json: JsonOption = False,
 ) -> None:
     """Show how far the error fell with each model; folders of one recording, in any order."""
     from sdimu_calibration.report.comparison import comparison, headings, remarks, simplest_first
-    from sdimu_calibration.storage.files.result_file import read_result
 
     if len(folders) < 2:
         raise DataError("compare: give at least two folders with a result.json each")
-    given = [read_result(folder) for folder in folders]
+    given = [_read(folder) for folder in folders]
     order = simplest_first(given)
     folders, results = [folders[k] for k in order], [given[k] for k in order]
     lines = comparison([str(folder) for folder in folders], results)
@@ -42,6 +44,18 @@ def compare(
             say(console, f"{folder.name}: {verdict}")
     rungs = [dict(zip(columns[1:], line[1:], strict=True)) for line in lines]
     answer(_content(folders, rungs, results), as_json)
+
+
+def _read(path: Path) -> Calibration:
+    """Read a result; what is none is told with what is expected."""
+    from sdimu_calibration.storage.files.result_file import read_result
+
+    if path.is_file() and path.suffix != ".json":
+        raise DataError(f"{path}: is no result; {_EXPECTED}")
+    try:
+        return read_result(path)
+    except DataError as error:
+        raise DataError(f"{error}; {_EXPECTED}") from error
 
 
 def _content(folders: list[Path], rungs: list[dict[str, str]], results: list[Calibration]) -> dict[str, Any]:

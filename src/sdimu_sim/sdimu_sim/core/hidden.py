@@ -12,6 +12,7 @@ calibrator's regressors. Index letters: {i} the sensor's own axis, {j} and {k} t
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
@@ -372,9 +373,18 @@ class _Found:
     sizes: dict[str, float] = field(default_factory=dict)
 
 
+_AXES = re.compile("[xyz]+")
+"""What a coefficient has behind the name of its effect: its axes."""
+
+
 def _take_named(key: EffectKey, found: _Found) -> None:
     name = key.name
     if name not in effect_names() and not load_plugins(name):
+        own = [one for one in effect_names() if _AXES.fullmatch(one.removeprefix(f"{name}_"))]
+        if own:
+            raise DataError(
+                f"effect '{name}' has several coefficients, each with a size of its own: name one of {', '.join(own)}"
+            )
         raise DataError(f"unknown effect '{name}'{_suggestion(name)}")
     size = read_quantity(f"effect {name}", key.size, size_unit(name))
     if name in _TABLE:

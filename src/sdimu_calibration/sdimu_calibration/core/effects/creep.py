@@ -48,7 +48,7 @@ def creep(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         _PRIOR[stem],
         needs_table=True,
         wander_like=True,
-        typical="gyro 0.01-0.1 deg/h with 5-200 s, accelerometer 1-20 ug",
+        typical={"gyro": "0.01-0.1 deg/h with 5-200 s", "accel": "1-20 ug"}[stem],
         description="Wind-up of leads and suspension that decays after the turn. Turns of the other sense change its "
         "sign; without them it is settling.",
         confused_with=(f"{stem}_bias_settling", f"{stem}_hysteresis", *alike),

@@ -57,7 +57,7 @@ def warm_up(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         scope="power-on",
         excitation=_OVER_TIME,
         bias_drift=True,
-        typical="gyro 0.05-1 deg/h with 300-1800 s, accelerometer 5-50 ug",
+        typical={"gyro": "0.05-1 deg/h with 300-1800 s", "accel": "5-50 ug"}[stem],
         description="Turn-on transient. Early stops against later ones in the same orientation.",
         confused_with=(f"{stem}_bias_temperature", f"{stem}_bias_ramp", f"{stem}_bias_random_walk"),
         options={"tau": f"{tau:g} s"},
@@ -142,7 +142,8 @@ def _ramp(stem: str) -> Effect:
         scope="power-on",
         excitation=_OVER_TIME,
         bias_drift=True,
-        typical="accelerometer 1-20 ug/h",
+        # Data sheets of gyros state none: the prior stands for it.
+        typical="1-20 ug/h" if stem == "accel" else "",
         description="Bias that runs away at a constant rate.",
         confused_with=(
             f"{stem}_bias_warm_up",

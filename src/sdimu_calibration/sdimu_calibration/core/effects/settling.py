@@ -36,7 +36,7 @@ def settling(stem: str, tau: float, ratio: float = 2.0) -> Effect:
         units,
         prior,
         wander_like=True,
-        typical="gyro 0.01-0.1 deg/h with 5-100 s, accelerometer 1-20 ug",
+        typical={"gyro": "0.01-0.1 deg/h with 5-100 s", "accel": "1-20 ug"}[stem],
         description="Torquers heated by the rate (DTG), charge and stress that decay once the table stands.",
         confused_with=(f"{stem}_bias_in_motion", f"{stem}_bias_step", f"{stem}_creep", *alike),
         options={"tau": f"{tau:g} s"},

@@ -41,7 +41,7 @@ def _triad(
         excitation=_OVER_TIME,
         shifts_bias=True,
         sheet="bias temperature coefficient",
-        typical="residual: gyro 0.002-0.1 deg/h/C, accelerometer 0.5-5 ug/C; raw 10-100 times more",
+        typical=f"residual: {'0.002-0.1 deg/h/C' if stem == 'gyro' else '0.5-5 ug/C'}; raw 10-100 times more",
         description="Slow; stops that repeat an orientation at another temperature decide. T0 is the temperature at "
         "the start.",
         confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_ramp", f"{stem}_bias_random_walk", *alike),
@@ -57,7 +57,7 @@ def _triad(
         excitation=_OVER_TIME,
         shifts_bias=True,
         sheet="bias temperature-rate coefficient",
-        typical="FOG 0.05-1 deg/h/(C/min), accelerometer 1-20 ug/(C/min)",
+        typical={"gyro": "FOG 0.05-1 deg/h/(C/min)", "accel": "1-20 ug/(C/min)"}[stem],
         description="Gradients inside the instrument: large while the temperature changes.",
         confused_with=(f"{stem}_bias_warm_up", f"{stem}_bias_step"),
     )

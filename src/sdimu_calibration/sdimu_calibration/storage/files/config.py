@@ -140,7 +140,9 @@ def find_config(kind: str, name_or_path: str | Path) -> Path:
     if path.is_file():
         return path
     known = names_of(kind)
-    raise DataError(f"no {kind} named '{text}' (there are: {', '.join(known) or 'none'}; or give a path to a file)")
+    near = get_close_matches(text, known, n=1)
+    hint = f"did you mean '{near[0]}'? There are: " if near else "there are: "
+    raise DataError(f"no {kind} named '{text}' ({hint}{', '.join(known) or 'none'}; or give a path to a file)")
 
 
 def names_of(kind: str) -> list[str]:
