@@ -90,5 +90,5 @@ def test_what_is_taken_as_absent_is_told_with_what_it_would_do():
     """ "No X (68 ug of it, Z is off by 154 sigma)" read as if X were there and Z were off."""
     one = Assumed("accel_scale_z", "reference_gravity", "reference_gravity", to_si(68.1, "ug"), "m/s^2", "ug", 153.6)
     assert taken_for_granted([one, replace(one, coefficient="accel_scale_x", sigmas=96.0)]) == (
-        "reference_gravity (68.1 ug would put accel_scale_z 154 sigma off)"
+        "if reference_gravity were 68.1 ug, accel_scale_z would be wrong by 154 sigma"
     )

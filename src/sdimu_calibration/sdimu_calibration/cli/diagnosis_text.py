@@ -232,8 +232,8 @@ def taken_for_granted(assumed: Sequence[Assumed]) -> str:
     for one in assumed:
         first.setdefault(one.family, one)
     told = [
-        f"{one.label} ({amount(one.size, one.display_unit)} {one.display_unit} would put {one.coefficient} "
-        f"{one.sigmas:.0f} sigma off)"
+        f"if {one.label} were {amount(one.size, one.display_unit)} {one.display_unit}, "
+        f"{one.coefficient} would be wrong by {one.sigmas:.0f} sigma"
         for one in first.values()
     ]
     return "; ".join(told[:_ASSUMED])

@@ -394,8 +394,9 @@ def tell_gain(
     tells = [gain(known.covariance, b.covariance) for b in (first, last)]
     say(
         console,
-        f"beyond what is known {start.name} tells {tells[0]:.1f} nat in {start.duration_s / 60.0:.1f} min, the plan "
-        f"found {tells[1]:.1f} nat in {found.minutes:.1f} min ({found.tried} plans tried)",
+        f"expected information beyond what is known: {tells[0]:.1f} nat by {start.name} in "
+        f"{start.duration_s / 60.0:.1f} min, {tells[1]:.1f} nat by the plan found in {found.minutes:.1f} min "
+        f"({found.tried} plans tried; nat: log of how the volume of the uncertainty shrinks)",
     )
     for labels in classes:
         names = [p.name for label in labels for p in resolve(label).parameters]

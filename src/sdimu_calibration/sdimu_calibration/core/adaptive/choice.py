@@ -210,7 +210,10 @@ def _reason(known: Knowledge, best: Move, now: Worth) -> str:
         lacked = _told(known, best.worth, best.row, now)
         if lacked.sum() > max(0.5 * nat.sum(), _WORDS_NAT):
             nearest = int(np.argmax(lacked))
-            told.append(f"tells {known.open.found} from {known.open.alike[nearest]} ({lacked[nearest]:+.1f} nat)")
+            told.append(
+                f"tells {known.open.found} from {known.open.alike[nearest]} (expected evidence "
+                f"{lacked[nearest]:+.1f} nat, the log of the odds)"
+            )
     if nat.max() > 0.0:
         i = int(np.argmax(nat))
         old, new = _times(now.ratio[0, i], best.worth.ratio[best.row, i])

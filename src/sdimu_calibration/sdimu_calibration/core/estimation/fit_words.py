@@ -14,15 +14,18 @@ _FAST = 3.0
 
 
 def in_noise_in_words(statistics: FitStatistics) -> str:
-    """Say which figure is right at 1: that in learned noise where any was, with what is not in that noise."""
+    """Say what the figures are in learned noise, where any was, with what is not in that noise; else nothing."""
     nis, held_out = statistics.nis_in_noise, statistics.held_out_in_noise
     if nis is None or held_out is None:
-        return "; 1 is right"
+        return ""
     if max(nis, held_out) <= MISFIT:
-        return f"; 1 is right; in noise that stands for what is missing they are {nis:.3f} and {held_out:.3f}"
+        return (
+            f"; noise that was learned in place of what is missing takes them to {nis:.3f} and {held_out:.3f}, and "
+            "mends no coefficient"
+        )
     fast = ": noise that moves within seconds is not in it" if nis > MISFIT else ""
     small = ", so the sigmas are too small" if nis > _FAST else ""
-    return f"; in the noise that was learned NIS {nis:.3f}, held-out error {held_out:.3f}, 1 is right{fast}{small}"
+    return f"; noise that was learned takes them to {nis:.3f} and {held_out:.3f}, where 1 is right, too{fast}{small}"
 
 
 def stated_priors(model: Model) -> tuple[str, ...]:

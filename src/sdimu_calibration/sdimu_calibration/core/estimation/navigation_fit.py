@@ -431,8 +431,8 @@ class NavigationFit(Fit):
         if any(figure is not None and figure > MISFIT for figure in judged):
             nis, held_out = statistics.nis_mean, statistics.held_out_rms
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
-            told = f"the model{white} does not fit ({text}{in_noise_in_words(statistics)}){self._lost_in_words()}"
-            told += self._noise_in_words(nis)
+            told = f"the model{white} does not fit ({text}; 1 is right){in_noise_in_words(statistics)}"
+            told += self._lost_in_words() + self._noise_in_words(nis)
             out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
         elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults], self.test.recording.notes):
             out.append(not_of_sensors(odd))
