@@ -61,6 +61,22 @@ def test_every_figure_is_drawn(opened: Any) -> None:
     assert opened.locator(".figure .main-svg").count() >= opened.locator(".figure").count()
 
 
+@pytest.mark.parametrize("tells_when_idle", [True, False])
+def test_figures_out_of_sight_are_drawn_without_scrolling(browser: Any, report: Path, tells_when_idle: bool) -> None:
+    """In a picture of the whole page they were white."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    if not tells_when_idle:
+        page.add_init_script("window.requestIdleCallback = undefined")
+    page.goto(report.as_uri())
+    folded = "[...document.querySelectorAll('.figure')].filter(e => !e.clientWidth)"
+    page.wait_for_function(f"document.querySelectorAll('.figure:not([data-drawn])').length === {folded}.length")
+    drawn = page.locator(".figure .main-svg").evaluate_all("all => all.map(e => e.getBoundingClientRect().top)")
+    assert max(drawn) > 2 * 900
+    assert page.evaluate("window.scrollY") == 0
+    assert page.evaluate(f"{folded}.filter(e => e.dataset.drawn).length") == 0
+    page.close()
+
+
 def test_no_rule_of_accessibility_is_broken(opened: Any) -> None:
     opened.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     assert broken_rules(opened) == []

@@ -191,7 +191,7 @@ def literal(text: str) -> str:
 
 
 def html(figure: Figure, number: int) -> str:
-    """Return a figure as a part of a page; `design.sheet.document` brings the library and draws it when it is near."""
+    """Return a figure as a part of a page; `design.sheet.document` brings the library, which draws it."""
     content = as_script({"data": figure.data, "layout": figure.layout}, _array)
     height = figure.layout["height"]
     return (

@@ -1,8 +1,11 @@
-// Draws figures when they come near the window, in the colours of the theme; those that are folded away wait.
+// Draws figures when they come near the window, in the colours of the theme, and then the others one after the other
+// while there is nothing else to do; those that are folded away wait.
 (function () {
   var LARGE = 1.5, NEAR = '400px', CELL = 27, WIDE = 33.5, BAR = 80, NOTABLE = 3, queue = [], library = null;
   // Width of a digit below a map and what keeps labels apart; least height of the map of a first screen (px).
   var DIGIT = 8, APART = 8, LEAST = 225;
+  // Wait of a browser that does not tell when it is idle, and longest one of others (ms).
+  var PAUSE = 50, LONGEST = 1000;
 
   // The library lies in the page compressed: it is unpacked once, after the page is there.
   function load() {
@@ -99,17 +102,31 @@
     });
   }
 
+  // A capture of the whole page shows what was never near the window, too.
+  function whenIdle(work) {
+    if (window.requestIdleCallback) { window.requestIdleCallback(work, {timeout: LONGEST}); } else { setTimeout(work, PAUSE); }
+  }
+  function rest() {
+    load().then(function () {
+      var place = queue.length ? null : all().find(function (p) { return !p.dataset.drawn && p.clientWidth; });
+      if (place) { draw(place); }
+      if (place || queue.length) { whenIdle(rest); }
+    });
+  }
+
   // For tests and for printing by a program: draws everything, folded away or not.
   window.sdimuDrawAll = function () { return load().then(function () { all().forEach(draw); }); };
   function all() { return Array.from(document.querySelectorAll('.figure')); }
   document.addEventListener('DOMContentLoaded', function () {
-    var near = new IntersectionObserver(function (entries) {
+    var begun = false, near = new IntersectionObserver(function (entries) {
       entries.forEach(function (entry) {
         if (!entry.isIntersecting) { return; }
         near.unobserve(entry.target);
         queue.push(entry.target);
         if (queue.length === 1) { next(); }
       });
+      // The first call is of all figures: those near the window are in the queue now.
+      if (!begun) { begun = true; whenIdle(rest); }
     }, {rootMargin: NEAR});
     all().forEach(function (place) { near.observe(place); });
     setTimeout(load, 0);
