@@ -33,9 +33,10 @@ from sdimu_calibration.report.cost import in_use, in_use_entry, metres
 from sdimu_calibration.report.evidence_figures import heat_maps
 from sdimu_calibration.report.first_screen import ladder_strip
 from sdimu_calibration.report.markup import prose, section, signs
+from sdimu_calibration.report.may_be import MayBe, classes_of
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras, report_extras
-from sdimu_calibration.report.sections import classes_of, confused, found_table
+from sdimu_calibration.report.sections import confused, found_table
 from sdimu_calibration.report.table import rows
 from sdimu_calibration.report.traceability import recorded, traceability
 from sdimu_calibration.storage.trace import Trace
@@ -269,9 +270,10 @@ def test_what_looks_the_same_shares_the_bar_of_what_was_found(diagnosis):
     other = next(one.label for one in entries if not one.chosen and one.z and "(" not in one.label)
     alone = evidence_figures.ranking(entries, 4.0).data[0]
     assert other in alone["y"]
-    shares = {found.coefficient: {found.coefficient: "82 %", other: "18 %"}}
+    shares = {found.coefficient: MayBe("98 %", {found.coefficient: "82 %", other: "18 %"})}
     figure = evidence_figures.ranking(entries, 4.0, shares)
     folded, axis = figure.data[0], figure.layout["yaxis"]
+    assert [text.partition(", ")[2] for text in figure.data[1]["text"] if "%" in text] == ["98 %"]
     assert other not in folded["y"]
     (words,) = (text for text in folded["customdata"] if "82 %" in text)
     assert words.startswith(f"{found.coefficient} 82 %<br>")
@@ -302,8 +304,17 @@ def test_a_bar_of_a_class_says_how_probable_its_own_effect_is(diagnosis):
     """The likeliest of a class stood there, whichever effect had the bar."""
     (one,) = summarise(diagnosis).found
     own = one.candidate.coefficient
-    (shares,) = classes_of([replace(one, may_be=(Share("other_effect", 0.7), Share(own, 0.3)))]).values()
-    assert list(shares.items()) == [(own, "30 %"), ("other_effect", "70 %")]
+    open_ = replace(one, may_be=(Share("other_effect", 0.7), Share(own, 0.3)), probability=0.97)
+    (told,) = classes_of([open_]).values()
+    assert list(told.shares.items()) == [(own, "30 %"), ("other_effect", "70 %")]
+    assert told.probability == "97 %"
+
+
+def test_a_bar_of_an_effect_that_is_certain_says_so(diagnosis):
+    summary = summarise(diagnosis)
+    (told,) = classes_of(summary.found, diagnosis.probabilities).values()
+    assert told.probability == "> 99 %"
+    assert not told.shares
 
 
 def test_a_map_of_rests_does_not_call_them_stops():
@@ -362,3 +373,14 @@ def test_a_hyphen_that_begins_no_number_stays(text):
 @pytest.mark.parametrize("text", ["-9.1 sigma", "turn X -180 deg", "gyro_bias_y (-3.0 deg/h)", "by -.5 ug"])
 def test_a_hyphen_that_begins_a_number_is_a_sign_of_minus(text):
     assert signs(text) == text.replace("-", "\N{MINUS SIGN}")
+
+
+def test_sizes_of_the_table_of_probabilities_have_one_sign_of_minus(diagnosis):
+    """Those of effects that were found had the hyphen of a terminal, the others the sign of print."""
+    summary = summarise(diagnosis)
+    minus = replace(summary, found=tuple(replace(one, value=-abs(one.value)) for one in summary.found))
+    text = page(diagnosis.after, Contents("x", summary=minus))
+    table = text.partition('<table class="odds">')[2].partition("</table>")[0]
+    sizes = re.findall(r"<td>([^<]*\N{PLUS-MINUS SIGN}[^<]*)</td>", table)
+    assert any(size.startswith("\N{MINUS SIGN}") for size in sizes)
+    assert not [size for size in sizes if "-" in size]

@@ -29,6 +29,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.cost import held_to_use, in_use_entry
 from sdimu_calibration.report.drawing import Figure
+from sdimu_calibration.report.may_be import MayBe, classes_of
 from sdimu_calibration.report.page import write_report
 from sdimu_calibration.report.report_extras import report_extras
 from sdimu_calibration.report.unknown_section import unknown_of
@@ -170,7 +171,10 @@ class FitDiagnosis(Diagnosed):
     def _ranking(self) -> Figure:
         if not isinstance(self.core.evidence, NavigationEvidence):
             return self._ranking_of_a_run()
-        return evidence_figures.ranking(data.scored(self.core), self.core.found.threshold)
+        return evidence_figures.ranking(data.scored(self.core), self.core.found.threshold, self._classes())
+
+    def _classes(self) -> dict[str, MayBe]:
+        return classes_of(self.core.found_effects, self.core.probabilities)
 
     def _ranking_of_a_run(self) -> Figure:
         problem, found = Problem(self.core.evidence), self.core.found
@@ -178,7 +182,7 @@ class FitDiagnosis(Diagnosed):
         free = set(self.core.free.tolist())
         columns = [k for k in range(problem.p, len(self.core.evidence.names)) if k not in free]
         return evidence_figures.ranking(
-            data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold
+            data.scores(self.core.evidence, first, last, columns, found.chosen), found.threshold, self._classes()
         )
 
     @overload

@@ -11,6 +11,7 @@ from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.design.palette import DIVERGING
 from sdimu_calibration.report.drawing import AFTER, BEFORE, INK, MUTED, PALE, Figure, lay_out, literal
+from sdimu_calibration.report.may_be import MayBe
 from sdimu_calibration.report.table import with_sigma
 
 _FULL = 8.0
@@ -28,7 +29,8 @@ _TICKS = {
 """Numbers beside the colours of a heat map: from which size a cell counts, and where the colour is full."""
 _MOST_NUMBERED = 40
 """Stops up to which there is room for numbers in the cells."""
-_MOST_BARS = 24
+MOST_BARS = 24
+"""Number of bars of a ranking that a page has room for."""
 _BINS = 20
 _LEGEND = {"orientation": "h", "xanchor": "right", "x": 1.0, "yanchor": "bottom", "y": 1.03}
 _ABOVE = "{}<br>\N{NO-BREAK SPACE}<br>\N{NO-BREAK SPACE}"
@@ -109,20 +111,32 @@ def sign(value: float) -> str:
     return "+" if value > 0.0 else "\N{MINUS SIGN}"
 
 
+def barred(entries: Sequence[data.Scored], classes: Mapping[str, MayBe], most: int) -> list[data.Scored]:
+    """Choose those that have a bar, the largest score first: at most `most`, and always what was found.
+
+    `classes`: by the coefficient of an effect that was found, what it may be: that has no bar of its own.
+    """
+    folded = {name for one in classes.values() for name in one.shares} - set(classes)
+    rows = [s for s in data.best_variants(entries) if s.chosen or s.coefficient not in folded]
+    found = {s.label for s in rows if s.chosen or s.coefficient in classes}
+    others = [s.label for s in rows if s.label not in found]
+    kept = found.union(others[: max(most - len(found), 0)])
+    return [s for s in rows if s.label in kept]
+
+
 def ranking(
-    entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, Mapping[str, str]] | None = None
+    entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, MayBe] | None = None, most: int = MOST_BARS
 ) -> Figure:
     """Bars of ``|z|``: what each candidate says alone, and what is left of it; the line is what noise reaches.
 
-    `threshold`: score that noise reaches. `classes`: by the coefficient of an effect that was found: what it may be,
-    itself first, each with its probability in words. Those share bar and name of the effect, and what the mouse tells.
+    `threshold`: score that noise reaches. `classes`: by the coefficient of an effect that was found, what it may be:
+    those share bar and name of the effect, and what the mouse tells. `most`: number of bars, if fewer were found.
     """
     told = classes or {}
-    folded = {name for shares in told.values() for name in shares} - set(told)
-    shown = [s for s in data.best_variants(entries) if s.chosen or s.coefficient not in folded][:_MOST_BARS]
+    shown = barred(entries, told, most)
     marks = ["\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "" for s in shown]
     names = [m + literal(s.label) for m, s in zip(marks, shown, strict=True)]
-    shares = [told.get(s.coefficient, {}) for s in shown]
+    found = [told.get(s.coefficient, MayBe()) for s in shown]
     figure = Figure()
     figure.add(
         "bar",
@@ -131,12 +145,12 @@ def ranking(
         orientation="h",
         name="model as given",
         marker={
-            "color": [_family_ink(s.label) for s in shown],
-            "opacity": [1.0 if s.chosen else _ASIDE for s in shown],
+            "color": [family_ink(s.label) for s in shown],
+            "opacity": [1.0 if s.chosen else ASIDE for s in shown],
             "line": {"color": INK, "width": 1},
         },
         showlegend=False,
-        customdata=[_in_full(s, share) for s, share in zip(shown, shares, strict=True)],
+        customdata=[_in_full(s, one.shares) for s, one in zip(shown, found, strict=True)],
         hovertemplate="|z| = %{x:.1f}<br>%{customdata}<extra></extra>",
     )
     # Beside the bar, but never under the line of the noise.
@@ -145,22 +159,15 @@ def ranking(
         y=names,
         x=[max(abs(s.z), threshold) for s in shown],
         mode="text",
-        text=[f"\N{NO-BREAK SPACE}{_size(s)}" for s in shown],
+        customdata=[one.probability for one in found],
+        text=[beside(_size(s), one.probability) for s, one in zip(shown, found, strict=True)],
         textposition="middle right",
         cliponaxis=False,
         hoverinfo="skip",
         showlegend=False,
     )
     if any(s.chosen for s in shown):
-        figure.add(
-            "scatter",
-            y=names,
-            x=[abs(s.left) for s in shown],
-            mode="markers",
-            name="left when what was found is added",
-            marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
-            hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
-        )
+        _left(figure, names, shown)
     _legend_of_families(figure, shown)
     figure.shape("line", x0=threshold, x1=threshold, line=_LIMIT, opacity=1.0)
     figure.annotate(
@@ -170,7 +177,7 @@ def ranking(
     figure.x_axes(title="score |z| (sigma)", range=[0, _BESIDE * top])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     # A category stays the label, by which a click takes it.
-    alike = [m + with_look_alikes(list(one) or [s.label]) for m, s, one in zip(marks, shown, shares, strict=True)]
+    alike = [m + literal(bar_name(s, one)) for m, s, one in zip(marks, shown, found, strict=True)]
     figure.y_axes(tickmode="array", tickvals=names, ticktext=alike)
     margin = {"l": 80, "r": 20, "t": 75, "b": 55}
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
@@ -178,23 +185,42 @@ def ranking(
 
 _BESIDE = 1.55
 """Width of the axis of candidates as a multiple of the longest bar: its size stands beside it in a window of 800 px."""
-_FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
+FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
 """Ink of a bar by what its effect acts on."""
-_ASIDE = 0.45
+ASIDE = 0.45
 """Opacity of the bar of an effect that was not found (1): those that were stand out."""
+
+
+def _left(figure: Figure, names: Sequence[str], shown: Sequence[data.Scored]) -> None:
+    """Mark what is left of each score."""
+    figure.add(
+        "scatter",
+        y=list(names),
+        x=[abs(s.left) for s in shown],
+        mode="markers",
+        name="left when what was found is added",
+        marker={"symbol": "diamond-open", "color": AFTER, "size": 9, "line": {"width": 2}},
+        hovertemplate="%{y}<br>left: |z| = %{x:.1f}<extra></extra>",
+    )
 
 
 def _legend_of_families(figure: Figure, shown: Sequence[data.Scored]) -> None:
     """Say which ink a bar has by what its effect acts on."""
-    for word, ink in _FAMILY_INK.items():
-        if any(_family_ink(s.label) == ink for s in shown):
+    for word, ink in FAMILY_INK.items():
+        if any(family_ink(s.label) == ink for s in shown):
             mark = {"symbol": "square", "color": ink, "size": 10}
             figure.add("scatter", x=[None], y=[None], mode="markers", name=word, marker=mark, hoverinfo="skip")
 
 
-def _family_ink(label: str) -> str:
+def family_ink(label: str) -> str:
+    """Ink of a bar by the label of its effect."""
     triad = label.partition("_")[0]
-    return _FAMILY_INK[{"gyro": "gyro", "accel": "accelerometer"}.get(triad, "other")]
+    return FAMILY_INK[{"gyro": "gyro", "accel": "accelerometer"}.get(triad, "other")]
+
+
+def beside(*words: str) -> str:
+    """Write what stands behind a bar."""
+    return literal("\N{NO-BREAK SPACE}" + ", ".join(word for word in words if word))
 
 
 def _size(entry: data.Scored) -> str:
@@ -205,6 +231,11 @@ def _in_full(entry: data.Scored, shares: Mapping[str, str]) -> str:
     """Name a bar with its size, and a line each, what it may be, with the probability."""
     own, *others = (f"{literal(name)} {p}" for name, p in (shares or {entry.label: ""}).items())
     return "<br>or ".join([f"{own.strip()}<br>{_size(entry)}", *others])
+
+
+def bar_name(entry: data.Scored, found: MayBe) -> str:
+    """Name a bar by its effect, and what that may be instead."""
+    return with_look_alikes(list(found.shares) or [entry.label])
 
 
 _WIDEST = 44
@@ -221,8 +252,8 @@ def with_look_alikes(names: Sequence[str]) -> str:
         more = f" and {len(others) - count} more" if count < len(others) else ""
         told = " or ".join([first, *(_short(first, other) for other in others[:count])]) + more
         if len(told) <= _WIDEST:
-            return literal(told)
-    return literal(f"{first} and {len(others)} more" if others else first)
+            return told
+    return f"{first} and {len(others)} more" if others else first
 
 
 def _short(first: str, other: str) -> str:

@@ -14,6 +14,7 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.markup import Draw, grid, quiet, section, sentence, switched
+from sdimu_calibration.report.may_be import classes_of
 from sdimu_calibration.report.sections import STEP_COLUMNS, found_table, step_row
 from sdimu_calibration.report.table import with_sigma
 
@@ -88,11 +89,11 @@ def _missing(summary: DiagnosisSummary, draw: Draw) -> str:
     return section(
         "Effects: what is missing, how large",
         found_table(summary),
-        draw(evidence_figures.ranking(entries, d.found.threshold)),
+        draw(evidence_figures.ranking(entries, d.found.threshold, classes_of(summary.found, d.probabilities))),
         quiet(
             "Each candidate is added to the model alone, everything else is estimated again, in sigmas of the last "
             "model; its size stands at the bar. The dashed line is what the largest of all candidates reaches on pure "
-            "noise once in fifty runs. A triangle marks a found effect."
+            "noise once in fifty runs. A triangle marks a found effect; behind its size stands how probable it is."
         ),
     )
 

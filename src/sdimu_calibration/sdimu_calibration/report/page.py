@@ -23,7 +23,7 @@ from sdimu_calibration.report.advice import Spell
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
-from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section
+from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section, signs
 from sdimu_calibration.report.odds_section import odds_of_set, odds_section
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections, where_it_fails
@@ -172,7 +172,7 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, means: bool, spell:
     `means`: as for `odds_section`.
     """
     diagnosis = summary.diagnosis
-    found = {one.candidate.label: size_of(one).replace("+-", "\N{PLUS-MINUS SIGN}") for one in summary.found}
+    found = {one.candidate.label: signs(size_of(one)) for one in summary.found}
     if diagnosis.fit.learns_scatter:
         odds = odds_section(diagnosis.probabilities, "in this run", found=found, means=means)
         return [odds, *handheld_sections.evidence(summary, draw), sections.confused(summary, spell)]

@@ -23,7 +23,8 @@ from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data
 from sdimu_calibration.report.architecture_figure import architecture_figure
 from sdimu_calibration.report.design.palette import DIVERGING, LIGHT, paint, palette
-from sdimu_calibration.report.evidence_figures import cell
+from sdimu_calibration.report.evidence_figures import ASIDE, FAMILY_INK, MOST_BARS, bar_name, barred, cell, family_ink
+from sdimu_calibration.report.may_be import MayBe, classes_of
 from sdimu_calibration.report.table import with_sigma
 
 STYLE = {
@@ -42,7 +43,10 @@ _COLOURS = 200
 _FULL = 8.0
 """Sigmas at which the colour of a heat map is full."""
 _WHITE_FROM = 6.0
-_MOST_BARS = 8
+_FEW_BARS = 8
+"""Number of bars in a small picture."""
+_AXES, _BAR = 0.7, 0.22
+"""Height of the axis of the candidates, and of a bar (inch)."""
 
 
 def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeInertialRun] = ()) -> list[Path]:
@@ -56,7 +60,7 @@ def write_pictures(folder: Path, diagnosis: Diagnosis, trials: Sequence[FreeIner
     with mpl.rc_context(STYLE):
         figures = {
             "heat-map": heat_maps(diagnosis),
-            "candidates": candidates(diagnosis),
+            "candidates": candidates(diagnosis, _FEW_BARS),
             "architecture": architecture_figure(),
         }
         if diagnosis.found.steps:
@@ -111,29 +115,36 @@ def draw_heat_map(axes: Any, grid: data.Grid) -> None:
     axes.spines[:].set_visible(False)
 
 
-def candidates(diagnosis: Diagnosis) -> Figure:
-    """Scores of the best candidates, and what noise reaches."""
-    shown = data.best_variants(data.scored(diagnosis))[:_MOST_BARS]
-    figure = Figure(figsize=(8.6, 2.7), layout="constrained")
+def candidates(diagnosis: Diagnosis, most: int = MOST_BARS) -> Figure:
+    """Scores of the best candidates, and what noise reaches: the bars of the page, in its colours.
+
+    `most`: number of bars, if fewer were found.
+    """
+    told, threshold = classes_of(diagnosis.found_effects, diagnosis.probabilities), diagnosis.found.threshold
+    shown = barred(data.scored(diagnosis), told, most)
+    found = [told.get(s.coefficient, MayBe()) for s in shown]
+    figure = Figure(figsize=(8.6, _AXES + _BAR * len(shown)), layout="constrained")
     axes = figure.add_subplot()
     at = np.arange(len(shown))
-    axes.barh(
-        at,
-        [abs(s.z) for s in shown],
-        color=[_MUTED if s.chosen else _LINE for s in shown],
-        edgecolor=_INK,
-        linewidth=0.6,
-        height=0.75,
-        label="added alone",
-    )
-    axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=_AFTER, ms=5, label="left with what was found")
-    axes.axvline(diagnosis.found.threshold, color=_INK, ls="--", lw=1.2, label="what noise reaches")
-    for k, s in enumerate(shown):
-        size = with_sigma(s.estimate, s.sigma, s.unit)
-        axes.text(max(abs(s.z), diagnosis.found.threshold), k, f" {size}", va="center", fontsize=8)
-    axes.set_yticks(at, [("\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "") + s.label for s in shown])
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.3 * max([abs(s.z) for s in shown] + [diagnosis.found.threshold]))
+    inks = [paint(family_ink(s.label), LIGHT) for s in shown]
+    bars = axes.barh(at, [abs(s.z) for s in shown], color=inks, edgecolor=_INK, linewidth=0.6, height=0.75)
+    for bar, s in zip(bars, shown, strict=True):
+        bar.set_alpha(1.0 if s.chosen else ASIDE)
+    for word, ink in FAMILY_INK.items():
+        if paint(ink, LIGHT) in inks:
+            axes.plot([], [], "s", color=paint(ink, LIGHT), label=f"{word}, added alone")
+    if any(s.chosen for s in shown):
+        left = "left with what was found"
+        axes.plot([abs(s.left) for s in shown], at, "D", mfc="white", mec=_AFTER, ms=5, label=left)
+    axes.axvline(threshold, color=_INK, ls="--", lw=1.2, label="what noise reaches")
+    for k, (s, one) in enumerate(zip(shown, found, strict=True)):
+        beside = ", ".join(word for word in (with_sigma(s.estimate, s.sigma, s.unit), one.probability) if word)
+        axes.text(max(abs(s.z), threshold), k, f" {beside}", va="center", fontsize=8)
+    marks = ["\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "" for s in shown]
+    names = [mark + bar_name(s, one) for mark, s, one in zip(marks, shown, found, strict=True)]
+    axes.set_yticks(at, names, fontsize=8)
+    axes.set_ylim(len(shown) - 0.5, -0.5)
+    axes.set_xlim(0.0, 1.4 * max([abs(s.z) for s in shown] + [threshold]))
     axes.set_xlabel("score |z| (sigma)")
     axes.legend(loc="lower right", frameon=False, fontsize=8)
     return figure

@@ -27,7 +27,8 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data, evidence_figures, measured, measured_figures, residual_figures
 from sdimu_calibration.report.advice import Spell, advice_html
 from sdimu_calibration.report.effect_words import effect_of_key, families, family_words, tip
-from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, switched
+from sdimu_calibration.report.markup import Draw, folded, grid, prose, quiet, section, sentence, signs, switched
+from sdimu_calibration.report.may_be import classes_of
 from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.table import with_sigma
 
@@ -174,27 +175,18 @@ def effects(summary: DiagnosisSummary, entries: Sequence[data.Scored], draw: Dra
         *fits,
         folded(
             "Every candidate, added alone",
-            draw(evidence_figures.ranking(entries, d.found.threshold, classes_of(summary.found))),
+            draw(evidence_figures.ranking(entries, d.found.threshold, classes_of(summary.found, d.probabilities))),
             quiet(
                 "All coefficients are estimated again with it; its size stands at the bar. The dashed line is what the "
                 "largest of all candidates reaches on pure noise once in fifty tests. A triangle marks a found effect; "
-                "what looks the same shares its bar and its line of names. Under the mouse each has its probability."
+                "what looks the same shares its bar and its line of names. Behind its size stands how probable it is "
+                "that one of these is missing; under the mouse each has its own probability."
             ),
         ),
         folded("Steps of the search", ladder(d)),
         folded("Ladder of refits: one effect at a time", refits(d.rungs, d.found.noise)) if d.rungs else "",
         quiet(numbers(d)),
     )
-
-
-def classes_of(found: Sequence[Found]) -> dict[str, dict[str, str]]:
-    """Say what each coefficient that was found may be, itself first, each with its probability in words."""
-    out = {}
-    for one in found:
-        own, shares = one.candidate.coefficient, percents_of(one.may_be)
-        if set(shares) - {own}:
-            out[own] = {own: in_percent(0.0)} | shares
-    return out
 
 
 _FOUND = ("effect", "coefficient", "size", "probability", "z", "log Bayes factor")
@@ -216,7 +208,7 @@ def found_table(summary: DiagnosisSummary) -> str:
             cells = (
                 size,
                 _own_share(one),
-                f"{one.z:+.1f}",
+                signs(f"{one.z:+.1f}"),
                 f"{one.log_bayes_factor:.0f}",
                 *([f"{fall[0]:.3f} \u2192 {fall[1]:.3f}" if np.isfinite(fall).all() else ""] if refitted else ()),
             )

@@ -12,7 +12,8 @@ from sdimu_calibration.core.arrays import Bools, Floats
 from sdimu_calibration.core.evidence.consistency import CHANNEL_NAMES
 from sdimu_calibration.report import data, evidence_figures
 from sdimu_calibration.report.cost import InUse, metres
-from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, INK, PALE, Figure, lay_out, literal
+from sdimu_calibration.report.drawing import AFTER, BAND, BEFORE, PALE, Figure, lay_out, literal
+from sdimu_calibration.report.may_be import MayBe
 from sdimu_calibration.report.workbench.axes import TIME
 from sdimu_calibration.report.workbench.fit import Fitted
 
@@ -25,7 +26,9 @@ _MOST_NUMBERED = 20
 """Number of stops whose numbers stand beside each other in the column of the heat map on a screen of 1440."""
 _MOST_BARS = 14
 _BAR_FONT = 11
-"""Size of the words in a bar (px): they are no higher than it."""
+"""Size of the words behind a bar (px): they are no higher than it."""
+_END, _BESIDE = 1.05, 1.4
+"""Width of the axis of candidates as a multiple of the longest bar, and where a probability stands behind it (1)."""
 _SHORT = {"l": 55, "r": 10, "t": 8, "b": 42}
 
 
@@ -61,31 +64,18 @@ def most_numbered(look: Any) -> int:
     return int(look.get("stops", _MOST_NUMBERED))
 
 
-def ranking(
-    entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, Mapping[str, str]] | None = None
-) -> Figure:
+def ranking(entries: Sequence[data.Scored], threshold: float, classes: Mapping[str, MayBe] | None = None) -> Figure:
     """Ranking of the report, without the sizes: the candidate that is looked at has its own beside it.
 
     `classes`: as `evidence_figures.ranking` takes them. What looks the same as an effect that was found shares its bar,
-    which tells how probable it is: the score alone may put the less probable first.
+    behind which stands how probable it is that one of them is missing.
     """
-    figure = evidence_figures.ranking(entries, threshold, classes)
-    del figure.data[1]
-    bars = figure.data[0]
-    for key in ("x", "y", "customdata"):
-        bars[key] = bars[key][:_MOST_BARS]
-    bars["marker"] |= {key: bars["marker"][key][:_MOST_BARS] for key in ("color", "opacity")}
-    shares = [(classes or {}).get(label.partition("(")[0], {}) for label in bars["y"]]
-    bars |= {
-        "text": [next(iter(share.values()), "") for share in shares],
-        "constraintext": "none",
-        "textposition": "inside",
-        "insidetextanchor": "start",
-        "textangle": 0,
-        "textfont": {"color": INK, "size": _BAR_FONT},
-    }
+    figure = evidence_figures.ranking(entries, threshold, classes, _MOST_BARS)
+    bars, words = figure.data[:2]
+    words |= {"text": [evidence_figures.beside(p) for p in words["customdata"]], "textfont": {"size": _BAR_FONT}}
+    room = _BESIDE if any(words["customdata"]) else _END
     # The names leave a narrow axis, for which the title of the report is too long.
-    figure.x_axes(title="|z| (sigma)", nticks=4, range=[0, 1.05 * max([*bars["x"], threshold])])
+    figure.x_axes(title="|z| (sigma)", nticks=4, range=[0, room * max([*bars["x"], threshold])])
     figure.y_axes(range=[len(bars["y"]) - 0.5, -0.5])
     figure.y_axes(title="candidate", standoff=0, tickfont={"size": 11})
     figure.layout |= {"showlegend": False, "height": HEIGHT, "margin": _SHORT | {"l": 20, "t": 22}}
@@ -238,7 +228,7 @@ def finished(figure: Figure, look: Any) -> Any:
     if made.layout.title.text:
         made.update_layout(title_font_size=14 * scale)
     made.update_traces(textfont_size=12 * scale, selector={"type": "heatmap"})
-    made.update_traces(textfont_size=_BAR_FONT * scale, selector={"type": "bar"})
+    made.update_traces(textfont_size=_BAR_FONT * scale, selector={"mode": "text"})
     made.update_traces(marker_size=8 * scale, selector={"type": "scatter"})
     made.update_annotations(font_size=_FONT * scale)
     made.update_yaxes(tickfont_size=11 * scale)

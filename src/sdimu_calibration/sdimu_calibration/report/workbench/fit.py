@@ -39,8 +39,8 @@ from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
 from sdimu_calibration.report.cost import InUse, Off, in_use, wrong_without
+from sdimu_calibration.report.may_be import MayBe, classes_of
 from sdimu_calibration.report.report_extras import FOUND, ReportExtras
-from sdimu_calibration.report.sections import classes_of
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, named, stated_priors
@@ -101,8 +101,8 @@ class Missing:
     worst: Off | None = None
     """The coefficient that is furthest off, in its sigmas, without what was found; None where nothing was, or none is.
     """
-    classes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """What each coefficient that was found may be, itself first, each with its probability in words."""
+    classes: Mapping[str, MayBe] = field(default_factory=dict)
+    """What each coefficient that was found may be."""
     in_use: InUse | None = None
     """Metres without aid: with nothing, each model of the ladder, and what was found; None where there are none."""
 
@@ -169,7 +169,7 @@ class FitSession:
                     unknown_of(told),
                     _mended(summary),
                     off[0] if off else None,
-                    classes_of(summary.found),
+                    classes_of(summary.found, told.probabilities),
                     self._in_metres(setting, scores.fit, told, tell),
                 )
                 _keep(self._missing, setting, found)
