@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.advice import (
     add,
     mend,
     others,
+    recorded_first,
     telling_stay,
     together,
 )
@@ -108,8 +109,20 @@ def test_what_is_likely_is_tried_and_not_kept():
     assert [one.kind for one in add([sure, open_])] == [Kind.KEEP, Kind.TRY]
     kept, tried = (sentence(one) for one in add([sure, open_]))
     assert kept == "Calibrate with accel_quadratic_x in the model: --add 'accel_quadratic_x'."
-    assert tried.startswith("It is open which effect it is: record more before accel_quadratic_y goes into the model. ")
+    before, _, then = tried.partition(". Afterwards, ")
+    assert before == "It is open which effect it is: record more before accel_quadratic_y goes into the model"
+    assert then == "if it is that one: --add 'accel_quadratic_x' --add 'accel_quadratic_y'."
     assert added(add([sure, open_])[1]) == ["accel_quadratic_x", "accel_quadratic_y"]
+
+
+def test_what_goes_into_the_model_after_a_recording_more_is_told_behind_what_to_record():
+    """The step that said to record more gave the command that adds the effect."""
+    mend, keep, again, plan = (
+        Advice(kind) for kind in (Kind.MEND_RECORDING, Kind.KEEP, Kind.RECORD_ONCE_MORE, Kind.PLAN_NEXT)
+    )
+    afterwards, turns = Advice(Kind.TRY), Advice(Kind.SIGNED_TURNS)
+    assert recorded_first([mend, keep, afterwards, again, plan, turns]) == (mend, keep, again, plan, afterwards, turns)
+    assert recorded_first([keep, afterwards, turns]) == (keep, afterwards, turns)
 
 
 def test_what_is_certain_is_tried_and_not_kept_while_it_is_open_which_of_its_family_it_is():

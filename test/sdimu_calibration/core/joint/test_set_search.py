@@ -187,5 +187,7 @@ def test_what_two_recordings_leave_open_the_advised_third_one_closes(options):
     closed = diagnose_set(three.members, options, here)
     assert [f.label for f in closed.findings] == ["gyro_scale_asymmetry_y"]
     assert "gyro_scale_quadratic_y" not in closed.findings[0].alike
-    assert found.advice[0] == Advice(Kind.TRY, ("gyro_scale_asymmetry_y",), Verb.ADD, ("gyro_scale_asymmetry_y",))
-    assert closed.advice[0] == replace(found.advice[0], kind=Kind.KEEP)
+    tried = Advice(Kind.TRY, ("gyro_scale_asymmetry_y",), Verb.ADD, ("gyro_scale_asymmetry_y",))
+    assert [one.kind for one in found.advice[:3]] == [Kind.RECORD_ONCE_MORE, Kind.PLAN_NEXT, Kind.TRY]
+    assert found.advice[2] == tried
+    assert closed.advice[0] == replace(tried, kind=Kind.KEEP)

@@ -7,7 +7,7 @@ of the rate needs both senses of turn, its shape two rates, a product of forces 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -119,7 +119,30 @@ def advice(
 ) -> tuple[Advice, ...]:
     """Advise, the most useful first."""
     out = [*_about_data(d), *_about_found(d, found, plan), *_about_plan(reached, plan)]
-    return tuple(dict.fromkeys(out))
+    return recorded_first(dict.fromkeys(out))
+
+
+_RECORDS = frozenset(
+    {
+        Kind.RECORD_ONCE_MORE,
+        Kind.NO_TURN_TELLS,
+        Kind.NO_PLAN_TELLS,
+        Kind.PLAN_NEXT,
+        Kind.TELL_APART,
+        Kind.RECORD_MORE,
+        Kind.RANK_TURNS,
+    }
+)
+"""What says how to record what is open: before an effect that is open goes into the model."""
+
+
+def recorded_first(advice: Iterable[Advice]) -> tuple[Advice, ...]:
+    """Put what goes into the model after a recording more behind the advice what to record."""
+    every = tuple(advice)
+    last = max((k for k, one in enumerate(every) if one.kind in _RECORDS), default=-1)
+    before = every[: last + 1]
+    now, afterwards = ([one for one in before if (one.kind == Kind.TRY) is late] for late in (False, True))
+    return (*now, *afterwards, *every[last + 1 :])
 
 
 def mend(d: Diagnosis) -> list[Advice]:
@@ -335,7 +358,7 @@ def handheld_advice(d: Diagnosis, found: tuple[Found, ...]) -> tuple[Advice, ...
         out.append(Advice(Kind.RECORD_IN_OTHER_ORDER))
     if not found and d.verdict == Verdict.CLASS_OF_EFFECTS:
         out.append(Advice(Kind.RECORD_MORE))
-    return tuple(dict.fromkeys(out))
+    return recorded_first(dict.fromkeys(out))
 
 
 def _more_handheld(one: Found) -> Advice:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.diagnosis.advice import adding
+from sdimu_calibration.core.diagnosis.advice import adding, recorded_first
 from sdimu_calibration.core.diagnosis.closing import Closing, closing_advice, next_recording
 from sdimu_calibration.core.diagnosis.grades import LISTED, size
 from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
@@ -283,4 +283,4 @@ def _advice(
         out.append(Advice(Kind.RECORD_MORE))
     if word == Verdict.UNEXPLAINED and not any(one.kind == Kind.LOOK_AT_RECORDING for one in steps):
         out.append(Advice(Kind.ONE_BY_ONE))
-    return tuple(out)
+    return recorded_first(out)

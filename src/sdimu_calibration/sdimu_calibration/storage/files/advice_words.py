@@ -152,9 +152,9 @@ _WORDS: dict[Kind, Callable[..., str]] = {
     Kind.UNKNOWN_CAUSE: _unknown,
     Kind.KEEP: lambda label: _keep(label or "what was found"),
     Kind.TRY: lambda label: (
-        f"It is open which effect it is: record more before {label} goes into the model. What it changes"
+        f"It is open which effect it is: record more before {label} goes into the model. Afterwards, if it is that one"
         if label
-        else "Of some it is open which effect it is. Record more before they go into the model. What they change"
+        else "It is open which these are. Record more before they go into the model. Afterwards, those that stay"
     ),
     Kind.RECORD_AGAIN: lambda label: f"{label} is a fault of this recording: record again and do not carry it over.",
     Kind.TELL_APART: _apart,
