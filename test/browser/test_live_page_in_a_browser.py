@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import pytest
 from werkzeug.serving import make_server
 
+from sdimu_calibration.report.glossary import WORDS
 from sdimu_calibration.report.live_page.app import build
 from sdimu_calibration.report.live_page.record import End, LiveRecord
 from sdimu_calibration.report.live_seen import Outline
@@ -18,6 +20,7 @@ from sdimu_calibration.report.live_text import SeenChoice, SeenDiagnosis
 from .conftest import broken_rules
 
 TEST = Outline(900.0, 4, ("gyro_bias", "accel_scale"), {"gyro_bias_x": "deg/h", "accel_scale_x": "ppm"})
+ABOUT = ["out/run", "plan kim18", "IMU dtg", "daejeon"]
 EFFECT = "gyro_scale_asymmetry_y"
 CHANNELS = tuple(f"{what}_{axis}" for what in ("position", "velocity", "gyro", "accel") for axis in "xyz")
 
@@ -45,19 +48,25 @@ class Now:
 
 @pytest.fixture
 def record() -> LiveRecord:
-    record = LiveRecord(TEST, "out/run")
+    record = LiveRecord(TEST, "out/run", " \N{MIDDLE DOT} ".join(ABOUT))
     record.take(Now(1), True, 2.0)
     return record
 
 
-@pytest.fixture
-def server(record: LiveRecord) -> Iterator[Any]:
+@contextmanager
+def serving(record: LiveRecord) -> Iterator[Any]:
     made = make_server("127.0.0.1", 0, build(record).server, threaded=True)
     thread = threading.Thread(target=made.serve_forever, daemon=True)
     thread.start()
     yield made
     made.shutdown()
     made.server_close()
+
+
+@pytest.fixture
+def server(record: LiveRecord) -> Iterator[Any]:
+    with serving(record) as made:
+        yield made
 
 
 @pytest.fixture(params=["light", "dark"])
@@ -88,6 +97,38 @@ def test_the_maps_grow_and_their_first_channel_is_above(page, record):
     assert low > high
     assert "stop 3 of 3 dwell" in page.inner_text("#place")
     assert "3.3 min Y +90 deg at 10 deg/s: brings gyro_bias" in page.inner_text("#choices")
+
+
+def test_it_says_beside_the_title_which_test_it_is_and_explains_its_words(page):
+    said = page.locator(".bench-bar .about").inner_text()
+    assert said.split(" \N{MIDDLE DOT} ") == ABOUT
+    assert page.locator("h2 abbr").all_inner_texts() == ["Sigmas", "NIS", "sigma", "one stop left out"]
+    assert page.locator("#light abbr", has_text="NIS").get_attribute("title") == WORDS["NIS"]
+
+
+@pytest.mark.parametrize("width", [800, 1280, 1440])
+def test_no_entry_of_the_legend_is_cut(browser, width):
+    """The unit of a mass unbalance was: two entries stand beside each other in a narrow column."""
+    names = ("gyro_bias_x", "gyro_mass_unbalance_px", "gyro_misalignment_xy")
+    effects = ("gyro_bias", "gyro_mass_unbalance", "gyro_misalignment")
+    made = LiveRecord(Outline(900.0, 4, effects, dict.fromkeys(names, "deg/h/g")))
+    for stop in (1, 2):
+        now = Now(stop)
+        now.first = dict.fromkeys(names, 1e-5)
+        now.sigmas = dict.fromkeys(names, 4.6e-9 / stop)
+        made.take(now, True, 2.0)
+    with serving(made) as server:
+        page = browser.new_page(viewport={"width": width, "height": 900})
+        page.goto(f"http://127.0.0.1:{server.port}/")
+        page.wait_for_function("document.querySelectorAll('#sigmas .legendtext').length === 3")
+        right = "e => e.getBoundingClientRect().right"
+        # The last column ends at the frame, which cuts what is beyond it.
+        frame = page.locator("#sigmas .legend .bg").evaluate(right)
+        ends = page.locator("#sigmas .legendtext").evaluate_all(f"all => all.map({right})")
+        starts = page.locator("#sigmas .legendtext").evaluate_all("all => all.map(e => e.getBoundingClientRect().left)")
+        page.close()
+    assert len({round(start) for start in starts}) == 2
+    assert max(ends) <= frame
 
 
 def test_a_candidate_that_is_clicked_is_added_and_the_answer_is_shown(page, record):

@@ -103,7 +103,9 @@ def test_what_is_hidden_is_found_added_and_taken_home(
     assert (home / "report.html").stat().st_size < 6e6
     exported = json.loads((home / "result.json").read_text(encoding="utf-8"))
     assert_same_numbers(calibrated(workbench, home, tmp_path / "again"), exported)
-    shown = float(re.search(r"Held-out error, as a report gives it: ([\d.]+) sigma", text(page, "odds")).group(1))
+    shown = float(
+        re.search(r"a third of the stops left out, as in a report: ([\d.]+) sigma", text(page, "odds")).group(1)
+    )
     # The page goes on from the fit before, the command begins anew: both end within the tolerance of the passes.
     assert shown == pytest.approx(exported["fit"]["held_out_rms"], abs=0.002)
 

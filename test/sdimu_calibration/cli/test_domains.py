@@ -53,7 +53,9 @@ def test_what_is_no_domain_is_refused(tmp_path, monkeypatch, text):
         pytest.fail("that is no domain")
 
 
-ABOUT = RunningTest("/out/run", 900.0, 19, "baseline", "dtg", 1_700_000_000 * 10**9)
+ABOUT = RunningTest(
+    "/out/run", 900.0, 19, "baseline", "dtg", 1_700_000_000 * 10**9, course="plan kim18", site="daejeon"
+)
 
 
 def test_a_run_tells_those_that_watch_it_where_it_is_and_what_it_makes(tmp_path, monkeypatch):
@@ -62,6 +64,7 @@ def test_a_run_tells_those_that_watch_it_where_it_is_and_what_it_makes(tmp_path,
         assert running_tests() == (replace(ABOUT, domain=31),)
         assert watched(None) == replace(ABOUT, domain=31)
         assert watched(31) == replace(ABOUT, domain=31)
+        assert ABOUT.words == "/out/run \N{MIDDLE DOT} plan kim18 \N{MIDDLE DOT} IMU dtg \N{MIDDLE DOT} daejeon"
         assert watched(32) is None  # nodes without a run say nothing of their test
         assert is_held(31)
     assert running_tests() == ()

@@ -6,7 +6,7 @@ import pytest
 
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.report import pdf
-from sdimu_calibration.report.glossary import WORDS, explained
+from sdimu_calibration.report.glossary import WORDS, explained, in_parts
 
 
 def test_a_word_is_explained_once_and_tags_stay_as_they_are():
@@ -15,6 +15,13 @@ def test_a_word_is_explained_once_and_tags_stay_as_they_are():
     assert told.startswith('<p title="NIS"><abbr title="RMS of measurement')
     assert ">Held-out error</abbr>" in told
     assert told.endswith("the held-out error again</p>")
+
+
+def test_the_two_errors_of_a_workbench_have_names_of_their_own_and_each_says_what_it_is():
+    told = list(in_parts("one stop left out 1.05; a third of the stops left out 1.23"))
+    assert [words for words, why in told if why] == ["one stop left out", "a third of the stops left out"]
+    assert len({why for _, why in told if why}) == 2
+    assert "".join(words for words, _ in told) == "one stop left out 1.05; a third of the stops left out 1.23"
 
 
 def test_a_part_of_a_word_is_no_word():

@@ -98,6 +98,17 @@ class RunningTest:
     start_ns: int = 0
     """Stamp of its begin."""
     domain: int = 0
+    course: str = ""
+    """What the table drives, such as ``plan kim18``."""
+    site: str = ""
+
+    @property
+    def words(self) -> str:
+        """Which test it is, in one line."""
+        from sdimu_calibration.core.origin import Origin
+        from sdimu_calibration.report.beside_title import beside_title
+
+        return beside_title(Origin(imu=self.imu, site=self.site), of=self.folder, course=self.course)
 
 
 def running_tests() -> tuple[RunningTest, ...]:

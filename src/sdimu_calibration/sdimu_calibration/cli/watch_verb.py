@@ -70,7 +70,7 @@ def watch(
     for line in opening_words(test, used, seconds)[: 1 if waited else None]:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     start_ns = None if test is None else test.start_ns
-    record = LiveRecord(outline, "" if test is None else test.folder)
+    record = LiveRecord(outline) if test is None else LiveRecord(outline, test.folder, test.words)
     with LivePage(page, record, console) as shown, closing(Monitor(start_ns, first)) as monitor:
         if add and (why := monitor.add(add)):
             raise DataError(f"--add {' '.join(add)}: {why}")

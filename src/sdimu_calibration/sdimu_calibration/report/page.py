@@ -15,11 +15,11 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.note import without_advice
-from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.results import Calibration, Rest
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import data, experiment, first_screen, handheld_sections, sections
 from sdimu_calibration.report.advice import Spell
+from sdimu_calibration.report.beside_title import of_calibration
 from sdimu_calibration.report.coefficients import coefficients_section
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
@@ -29,7 +29,7 @@ from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections, where_it_fails
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.table import as_far
-from sdimu_calibration.report.traceability import recorded, traceability
+from sdimu_calibration.report.traceability import traceability
 from sdimu_calibration.report.unknown_section import unknown_of, unknown_section
 from sdimu_calibration.report.use_section import in_use
 from sdimu_calibration.storage.files.whole_file import write_whole
@@ -95,10 +95,6 @@ def write_report(
     write_whole(path, page(calibration, contents))
 
 
-_NAMED = 4
-"""Number of recordings of a set that stand beside the title."""
-
-
 class _Drawing:
     """Turns figures into parts of one page."""
 
@@ -135,7 +131,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
     return document(
         contents.title,
         body,
-        under=_under(calibration),
+        under=escape(of_calibration(calibration)),
         contents=[(anchor(heading), heading.partition(":")[0]) for heading in headings],
         script=experiment.ATTITUDE_SCRIPT if fit is not None else "",
     )
@@ -186,21 +182,6 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, means: bool, spell:
         in_use(more, draw),
         sections.residuals(diagnosis, residuals, more, draw),
     ]
-
-
-def _under(calibration: Calibration) -> str:
-    """Say which recording it is of, beside the title."""
-    origin, counts = calibration.origin, calibration.data
-    together = () if calibration.of_set is None else calibration.of_set.recordings
-    words = [
-        origin.recording or first_of([one.name for one in together], _NAMED),
-        recorded(origin.start_ns),
-        f"{counts['duration_s'] / 60.0:.1f} min" if "duration_s" in counts else "",
-        f"IMU {origin.imu}" if origin.imu else "",
-        *origin.words,
-        origin.site,
-    ]
-    return escape(" \N{MIDDLE DOT} ".join(word for word in words if word))
 
 
 def _notes(notes: Sequence[str]) -> str:

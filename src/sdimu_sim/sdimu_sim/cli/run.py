@@ -76,8 +76,12 @@ class LiveTest:
     @property
     def title(self) -> str:
         """What the test is called on its page."""
-        course = f"adaptive to {self.adaptive}" if self.adaptive else f"plan {self.followed}"
-        return f"Simulated test: {course}, model {self.model}"
+        return f"Simulated test: {self.course}, model {self.model}"
+
+    @property
+    def course(self) -> str:
+        """What the table drives."""
+        return f"adaptive to {self.adaptive}" if self.adaptive else f"plan {self.followed}"
 
 
 @with_options
@@ -111,10 +115,10 @@ def run(
         duration = _choosing(options, test.adaptive, test.ask, test.tell or [])
     console = make_console()
     outline = _test(None if test.adaptive else test.followed, test.model, duration)
-    record = LiveRecord(outline, str(out.resolve()))
+    about = _about(options, test, duration, out)
+    record = LiveRecord(outline, about.folder, about.words)
     with own_folder(out), LivePage(page, record, console) as shown:
         begun = time.monotonic()
-        about = _about(options, test, duration, out)
         with own_domain(out / "log", domain, about) as used, Children(out / "log") as children:
             _clear(out, test.followed, replace)
             console.print(f"ROS domain {used}", highlight=False)
@@ -139,7 +143,8 @@ def _about(options: dict[str, dict[str, Any]], test: LiveTest, duration: float, 
 
     stops = 0 if test.adaptive else len(load_plan(test.followed).dwell_s)
     start_ns = int(options["table"]["start_ns"])
-    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns)
+    place = {"course": test.course, "site": options["calibration"]["site"]}
+    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns, **place)
 
 
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:

@@ -273,7 +273,7 @@ def test_a_state_of_another_server_shows_a_fresh_page_and_says_so(app):
     page = Page(app, {"now": {"added": ["no_such_effect"]}, "recording": "gone"})
     shown = page.post("numbers.children", "state.modified_timestamp")
     assert "gone" in shown["message"]["children"]
-    assert shown["title"]["children"].endswith("good")
+    assert shown["about"]["children"].startswith("good \N{MIDDLE DOT} ")
 
 
 def test_models_of_a_page_stand_side_by_side_after_an_undo(app):

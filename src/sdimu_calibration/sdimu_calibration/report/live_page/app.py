@@ -23,6 +23,7 @@ from sdimu_calibration.report.live_page.record import (
 )
 from sdimu_calibration.report.live_page.visitors import Visitors
 from sdimu_calibration.report.workbench.dash_page import application
+from sdimu_calibration.report.workbench.elements import explained
 from sdimu_calibration.report.workbench.guard import LOOPBACK
 
 _RUN, _LOOK = "run", "look"
@@ -35,7 +36,7 @@ def build(record: LiveRecord, host: str = LOOPBACK[0], visitors: Visitors | None
     `visitors`: where pages are noted.
     """
     app = application("sdimu live", host, view.STYLE, view.SCRIPT)
-    app.layout = lambda: view.layout(record.folder)
+    app.layout = lambda: view.layout(record.folder, record.about)
     _follow(app, record, visitors or Visitors())
     _add(app, record)
     return app
@@ -44,7 +45,14 @@ def build(record: LiveRecord, host: str = LOOPBACK[0], visitors: Visitors | None
 def _head(now: LiveView, _look: Any) -> tuple[Any, ...]:
     end = now.head.end
     shown = parts.ended(end) if end else []
-    return parts.place(now.head), "" if end else now.head.light, shown, parts.end_class(end), end is not None, bool(end)
+    return (
+        parts.place(now.head),
+        "" if end else explained(now.head.light),
+        shown,
+        parts.end_class(end),
+        end is not None,
+        bool(end),
+    )
 
 
 def _curves(now: LiveView, look: Any) -> tuple[Any, ...]:

@@ -36,10 +36,10 @@ _FONT = {"size": 12}
 _KEPT = "kept"
 """Name under which plotly keeps what a person zoomed, while a figure grows."""
 _MARGIN = {"l": 60, "r": 14, "t": 10, "b": 44}
-_LEGEND_FONT = 10
-"""Size of the words of a legend (px): with it the longest, of mass unbalances, is not cut at the end of its unit."""
+_LEGEND_FONT = 9.3
+"""Size of the words of a legend (px): with it the longest, of mass unbalances, is no wider than `_ENTRY`."""
 _LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": _LEGEND_FONT}}
-_ENTRY = 176
+_ENTRY = 182
 """Width of the words of an entry of the legend (px): two stand beside each other in a column of 470."""
 _LABELS = 14
 """Number of stops that are written below a map: more would touch each other, or be turned on their side."""

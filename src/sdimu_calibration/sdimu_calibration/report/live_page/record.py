@@ -84,10 +84,12 @@ class LiveRecord:
         What was known before.
     folder : str
         Of the results; empty where nobody knows.
+    about : str
+        Which test it is, in one line: what is known of folder, plan, IMU, unit and site.
     """
 
-    def __init__(self, test: Outline, folder: str = "") -> None:
-        self.folder = folder
+    def __init__(self, test: Outline, folder: str = "", about: str = "") -> None:
+        self.folder, self.about = folder, about
         self._test = test
         self._run = uuid4().hex
         self._lock = threading.Lock()

@@ -18,8 +18,16 @@ EVERY_MS = 1000
 """Wall time (ms) after which a page asks what is new."""
 
 
-def layout(folder: str) -> Any:
-    """Lay a fresh page out. `folder`: of the results; empty where nobody knows."""
+def layout(folder: str, about: str = "") -> Any:
+    """Lay a fresh page out.
+
+    Parameters
+    ----------
+    folder : str
+        Of the results; empty where nobody knows.
+    about : str
+        Which test it is of, beside the title.
+    """
     where = f" The results are in {folder}." if folder else ""
     return html.Div(
         [
@@ -35,19 +43,22 @@ def layout(folder: str) -> Any:
                 role="alert",
                 hidden=True,
             ),
-            _bar(),
+            _bar(about),
             html.Main(html.Div([_left(), _middle(), _right()], className="bench live")),
         ]
     )
 
 
-def _bar() -> Any:
+def _bar(about: str) -> Any:
     return html.Header(
         [
             html.Div(
                 [
                     html.H1("Live test"),
-                    html.Div(id="place", className="grow place", role="status"),
+                    html.Div(
+                        [html.Div(about, className="about"), html.Div(id="place", className="place", role="status")],
+                        className="grow",
+                    ),
                     html.Button("Dark page", id="theme", **{"data-switch-theme": ""}),
                 ],
                 className="line",
@@ -84,7 +95,10 @@ def _middle() -> Any:
                 "Where does it fail? Mean innovation over its sigma",
                 graph("heat", "Normalised mean of every channel at every stop"),
             ),
-            card("How far the error fell", graph("errors", "Error with one stop left out, of each model, by stop")),
+            card(
+                "How far the error fell: one stop left out",
+                graph("errors", "Error with one stop left out, of each model, by stop"),
+            ),
         ],
         className="column",
     )

@@ -17,6 +17,7 @@ from sdimu_calibration.report.cost import OVER_MODELS, InUse
 from sdimu_calibration.report.markup import signs
 from sdimu_calibration.report.odds_section import family_in_words
 from sdimu_calibration.report.table import with_sigma
+from sdimu_calibration.report.workbench.elements import explained
 from sdimu_calibration.report.workbench.fit import Fitted, Missing, Preview
 from sdimu_calibration.report.workbench.setting import Setting
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -54,8 +55,12 @@ def verdict(missing: Missing, objections: Sequence[str]) -> tuple[str, str]:
 def odds(missing: Missing) -> list[Any]:
     """List what may be missing, the likeliest first, each with its probability, its members in a tip; what is left."""
     told, left = missing.probabilities, missing.left
-    held = "" if missing.held_out is None else f"Held-out error, as a report gives it: {missing.held_out:.3f} sigma. "
-    rest = html.P(f"{held}Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof.")
+    held = (
+        ""
+        if missing.held_out is None
+        else f"Error with a third of the stops left out, as in a report: {missing.held_out:.3f} sigma. "
+    )
+    rest = html.P(explained(f"{held}Left by stops: chi-square {left.chi2:.0f}, {left.dof} dof."))
     if told is None:
         return [rest]
     rows = [("no effect of the catalogue is missing", told.nothing, "")]
@@ -126,7 +131,7 @@ def candidate(found: Preview, name: str) -> list[Any]:
         html.P(effect.equation, className="equation"),
         *cause,
         *(html.P(line) for line in _sizes(found)),
-        html.P(f"Error with one stop left out {error} sigma, by the linear model."),
+        html.P(explained(f"Error with one stop left out {error} sigma, by the linear model.")),
         *alike,
         *against,
     ]

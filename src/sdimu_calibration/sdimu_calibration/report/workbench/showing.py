@@ -12,7 +12,9 @@ from dash import State as Kept
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import UnitError
 from sdimu_calibration.report import data
+from sdimu_calibration.report.beside_title import of_calibration
 from sdimu_calibration.report.workbench import figures, parts, tables
+from sdimu_calibration.report.workbench.elements import explained
 from sdimu_calibration.report.workbench.fit import FitSession, Fitted, Preview, Tell
 from sdimu_calibration.report.workbench.own_effect import named
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache
@@ -60,7 +62,7 @@ def _show_states(app: Dash, shelf: RecordingCache, doing: TaskProgress) -> None:
     """Show what follows from a state. Heat map and residuals come with it: the search that follows takes longer."""
 
     @app.callback(
-        Output("title", "children"),
+        Output("about", "children"),
         Output("numbers", "children"),
         Output("ladder", "figure"),
         Output("added", "options"),
@@ -106,11 +108,11 @@ def _shown(bench: FitSession, now: State, recording: str, names: list[str], look
     setting = now.now
     rungs = [setting.rung(k) for k in range(len(setting.added) + 1)]
     fits = [bench.fit(rung, tell) for rung in rungs]
-    here, given = fits[-1], fits[0]
+    here, given = fits[-1], bench.fit(setting.given, tell)
     channel, stop = cell_of(now, here)
     return (
-        f"Workbench: {recording}",
-        parts.numbers(here, given),
+        of_calibration(here.calibration, recording),
+        explained(parts.numbers(here, given)),
         ladder(bench, setting, look, tell),
         [{"label": named(text), "value": text} for text in setting.added],
         [{"label": f"stop {s}", "value": s} for s in bench.stops],
@@ -130,7 +132,10 @@ def _shown(bench: FitSession, now: State, recording: str, names: list[str], look
 def ladder(bench: FitSession, setting: Setting, look: Any, tell: Tell) -> Any:
     """Draw the ladder of a setting, with its metres where they were worked out."""
     fits = [bench.fit(setting.rung(count), tell) for count in range(len(setting.added) + 1)]
-    words = ["model as given", *(f"+ {named(text)}" for text in setting.added)]
+    words = [
+        "your priors" if setting.rung(0) != setting.given else "model as given",
+        *(f"+ {named(text)}" for text in setting.added),
+    ]
     use = bench.known_in_use(setting)
     return figures.finished(figures.ladder(words, [r.held_out for r in fits], [r.at_held for r in fits], use), look)
 

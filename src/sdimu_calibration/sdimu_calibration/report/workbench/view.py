@@ -97,8 +97,8 @@ def _bar(title: str) -> Any:
         [
             html.Div(
                 [
-                    html.H1(title, id="title"),
-                    html.Div(id="numbers", className="grow"),
+                    html.H1(title),
+                    html.Div([html.Div(id="about", className="about"), html.Div(id="numbers")], className="grow"),
                     html.Div(["Working", html.Progress(value="0", max="1")], id="busy", className="busy", hidden=True),
                     html.Button("Undo", id="undo", title="Ctrl+Z"),
                     html.Button("Redo", id="redo", title="Ctrl+Y"),
@@ -192,8 +192,8 @@ def _middle() -> Any:
                 html.Div(graph("ranking", "Score of every candidate"), id="candidates"),
             ),
             card(
-                "How far the error fell",
-                graph("ladder", "Held-out error of each model, and its metres"),
+                "How far the error fell: one stop left out",
+                graph("ladder", "Error of each model with one stop left out, and its metres"),
                 html.P(id="in-use", className="quiet"),
             ),
         ],
