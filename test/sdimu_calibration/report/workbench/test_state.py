@@ -68,7 +68,12 @@ def test_the_priors_of_an_effect_go_with_it():
     state = state.then(setting)
     assert [name for name, _, _ in state.drop(own).now.priors] == ["gyro_bias_x", "gyro_drift_x"]
     assert [name for name, _, _ in state.drop("gyro_drift").now.priors] == ["bent_k", "gyro_bias_x"]
-    assert [name for name, _, _ in state.now.given.priors] == ["gyro_bias_x"]
+    assert [name for name, _, _ in state.now.rung(0).priors] == ["gyro_bias_x"]
+
+
+def test_the_model_as_given_has_no_prior_of_a_user_and_the_same_measurements():
+    setting = Setting(("gyro_drift",), held=(3,)).without_span(1.0, 2.0).with_prior("accel_bias_y", "110 ug", "5 ug")
+    assert setting.given == Setting(held=(3,), cut=((1.0, 2.0),))
 
 
 def test_a_page_sends_no_more_than_its_last_hundred_steps():

@@ -25,6 +25,7 @@ from sdimu_calibration.report.workbench.fit import FitSession
 from sdimu_calibration.report.workbench.parts import numbers
 from sdimu_calibration.report.workbench.recording_cache import RecordingCache, neighbours
 from sdimu_calibration.report.workbench.setting import Setting
+from sdimu_calibration.report.workbench.tables import coefficients
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
 from sdimu_calibration.storage.files.effect_file import extended_model
 
@@ -253,6 +254,19 @@ def test_a_coefficient_that_is_another_one_is_told(bench):
     twice = bench.fit(Setting(("gyro_x: 1",)))
     assert "gyro_bias_x and gyro_x: 1 cannot be told from each other" in numbers(twice, given)
     assert "cannot be told" not in numbers(given, given)
+
+
+def test_as_given_is_the_fit_without_priors_of_a_user(bench):
+    given = bench.fit(Setting())
+    setting = Setting().with_prior("accel_bias_y", "500 ug", "5 ug")
+    assert bench.fit(setting.given) is given
+    told = coefficients(bench.fit(setting.given), bench.fit(setting), setting)
+    (row,) = [
+        row for row in told.children[1].children if row.to_plotly_json()["props"]["data-coefficient"] == "accel_bias_y"
+    ]
+    k = given.calibration.names.index("accel_bias_y")
+    assert float(row.children[6].children) == pytest.approx(from_si(given.calibration.values[k], "ug"), abs=1.0)
+    assert abs(float(row.children[7].children)) > 10.0
 
 
 def test_the_first_stop_cannot_be_held_out(bench):

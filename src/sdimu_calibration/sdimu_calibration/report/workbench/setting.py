@@ -32,8 +32,8 @@ class Setting:
 
     @property
     def given(self) -> Setting:
-        """The model as given, fitted to the same measurements."""
-        return self.rung(0)
+        """The model as given, without effects and priors of a user, fitted to the same measurements."""
+        return replace(self, added=(), priors=())
 
     def without_span(self, begin: float, end: float) -> Setting:
         """Leave a span of time (s) out, too; spans that touch become one."""
