@@ -360,9 +360,8 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         fit = solve(opened, extended_model(model, added))
         diagnosis = climb(fit)
         summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
-    asked = Asked.of(
-        (out / "bag",), out, Place(site, imu), Fitted(None if model == DEFAULT_MODEL else model, add=added or None)
-    )
+    fitted = Fitted(None if model == DEFAULT_MODEL else model, add=added or None)
+    asked = Asked.of((out / "bag",), out, Place(site, imu), fitted)
     with written_together(out) as part:
         write_diagnosis(part / "diagnosis.json", summary, in_use=in_use_entry(more))
         _write_plan(part, out, test, summary)
