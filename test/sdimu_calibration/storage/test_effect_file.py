@@ -165,8 +165,9 @@ def test_adding_what_a_model_has_is_refused(model, added):
 
 
 def test_what_came_to_a_model_is_told_by_its_names():
-    result = (*load_model("baseline").effects, "accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)", "of my own")
-    assert added_to("baseline", result) == ["accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)"]
+    result = (*load_model("baseline").effects, "accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)", "gyro_x: ey^2")
+    added = ["accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)", "gyro_x: ey^2"]
+    assert added_to("baseline", (*result, "of my own")) == added
     assert added_to("baseline", load_model("baseline").effects) == []
 
 

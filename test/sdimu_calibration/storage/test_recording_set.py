@@ -10,6 +10,7 @@ import sys
 import time
 import zipfile
 from concurrent.futures import Executor, Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -254,27 +255,50 @@ def test_processes_give_the_same_digits(bags):
     np.testing.assert_array_equal(pool.estimate.values, here.estimate.values)
 
 
-def test_each_process_has_recordings_of_its_own(bags):
-    """It keeps them open, and another one would open them again."""
-    asked: list[list[str]] = [[], []]
+class Process(Executor):
+    """Does jobs at once, and remembers of which recordings they are; one that is broken does none."""
 
-    class Process(Executor):
-        def __init__(self, log):
-            self.log = log
+    def __init__(self, broken=False):
+        self.asked, self.broken, self.ended = [], broken, None
 
-        def submit(self, work, job):
-            self.log.append(job.member.name)
-            done = Future()
+    def submit(self, work, job):
+        self.asked.append(job.member.name)
+        done = Future()
+        if self.broken:
+            done.set_exception(BrokenProcessPool("killed"))
+        else:
             done.set_result(f"{work.__name__} {job.member.name}")
-            return done
+        return done
 
+    def shutdown(self, wait=True, *, cancel_futures=False):
+        self.ended = wait, cancel_futures
+
+
+@pytest.fixture
+def four_jobs(bags):
     options = replace(OPTIONS, model=replace(OPTIONS.model, effects=("gyro_bias", "accel_bias")))
-    jobs = [job_of(m, options, None) for m in set_of([bags / "run1", bags / "run2"], LIKE).members]
-    jobs.append(replace(jobs[0], member=replace(jobs[0].member, name="run3")))
-    pool = Pool(list(map(Process, asked)), None)
-    assert pool.do(jobs) == ["tried run1", "tried run2", "tried run3"]
-    pool.do(jobs[::-1])
-    assert asked == [["run1", "run3", "run3", "run1"], ["run2", "run2"]]
+    job = job_of(set_of([bags / "run1"], LIKE).members[0], options, None)
+    return [replace(job, member=replace(job.member, name=f"run{k}")) for k in range(1, 5)]
+
+
+def test_each_process_has_recordings_of_its_own_and_none_more_than_its_share(four_jobs):
+    """It keeps them open, and another one would open them again."""
+    one, other = Process(), Process()
+    pool = Pool([one, other], None)
+    assert pool.do(four_jobs[:3]) == ["tried run1", "tried run2", "tried run3"]
+    pool.do(four_jobs[::-1])
+    assert one.asked == ["run1", "run3", "run3", "run1"]
+    assert other.asked == ["run2", "run4", "run2"]
+    # Both are of the first process, which would work while the other has nothing to do.
+    pool.do([four_jobs[0], four_jobs[2]])
+    assert (one.asked[-1], other.asked[-1]) == ("run1", "run3")
+
+
+def test_where_the_system_ends_a_process_the_others_take_no_more_work(four_jobs):
+    one, other = Process(broken=True), Process()
+    with pytest.raises(DataError, match="memory is short"):
+        Pool([one, other], None).do(four_jobs)
+    assert one.ended == other.ended == (False, True)
 
 
 def test_recordings_stay_open_while_memory_holds_them():
@@ -288,14 +312,18 @@ def test_recordings_stay_open_while_memory_holds_them():
             opened.append(self.name)
             return SimpleNamespace(recording=SimpleNamespace(t=np.zeros(self.samples)))
 
-    kept = KeptOpen(10)
-    one, other, long = Source("one", 4), Source("other", 6), Source("long", 30)
+    kept = KeptOpen(2, 10)
+    one, other, long, short = Source("one", 4), Source("other", 6), Source("long", 30), Source("short", 1)
     for source in (one, other, one, other, long, long, one, one):
         kept.of(source, ())
     # A long one alone stays, and takes the place of all others.
     assert opened == ["one", "other", "long", "one"]
     kept.of(one, ("changed",))
     assert opened[-2:] == ["one", "one"]
+    # So many, however short they are.
+    for source in (short, other, one):
+        kept.of(source, ())
+    assert opened[-3:] == ["short", "other", "one"]
 
 
 def test_a_recording_is_fitted_once_for_questions_about_one_fit(bags):
@@ -303,6 +331,8 @@ def test_a_recording_is_fitted_once_for_questions_about_one_fit(bags):
     fit = fitted(job)
     assert fitted(replace(job, candidates=("gyro_bias_ramp",), with_local=True, rivals=True, stretches=True)) is fit
     assert fitted(replace(job, local=("gyro_bias_ramp_x",))) is not fit
+    test = job.member.open()
+    assert test.with_imu(test.imu).last(job.of_fit, lambda: "of another test") == "of another test"
     about = replace(job, about=dict.fromkeys(fit.names, 0.0))
     assert fitted(about) is not fitted(replace(about, about=dict.fromkeys(fit.names, 1e-9)))
 

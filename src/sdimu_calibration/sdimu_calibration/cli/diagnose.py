@@ -66,10 +66,8 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
     from sdimu_calibration.storage.files.model_choice import HANDHELD
     from sdimu_calibration.storage.trace import traced
 
-    console, asked = plain(stderr=request.as_json), request.asked_estimator
+    console = plain(stderr=request.as_json)
     printed = printing(console, request.pdf)
-    if request.bootstrap and asked == HANDHELD:
-        raise DataError(NO_BOOTSTRAP)
     extra = [effect for text in request.attempt or [] for effect in find_effects(text)]
     one = the_only(bags, opening, request)
     if isinstance(one, SetRequest):
@@ -77,7 +75,8 @@ def diagnose(bags: BagsArgument = None, *, request: DiagnosisRequest, opening: S
         diagnose_together(one, extra)
         return
     bag, opening, request = one
-    asked = request.asked_estimator
+    if request.bootstrap and request.asked_estimator == HANDHELD:
+        raise DataError(NO_BOOTSTRAP)
     folder = request.out or default_folder(bag, "diagnosis")
     check_plan_room(folder)
     test, wanted, chosen = opened(console, bag, opening, request)

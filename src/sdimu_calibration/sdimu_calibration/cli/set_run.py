@@ -81,7 +81,7 @@ def the_only(bags: list[Path] | None, opening: StatedOpening, request: R) -> tup
     if len(wanted.members) > 1 or not isinstance(source, BagSource):
         return SetRequest((), opening, request)
     (member,) = wanted.members
-    degc = None if source.reference_degc is None else f"{source.reference_degc:g} degC"
+    degc = None if source.reference_degc is None else f"{source.reference_degc!r} degC"
     opening = replace(
         opening,
         site=source.site,

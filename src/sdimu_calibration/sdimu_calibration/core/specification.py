@@ -174,5 +174,7 @@ class Model:
     extra_force_sigma: float = 0.0
     """`extra_rate_sigma`, `extra_force_sigma`: noise of Zw and Zf per epoch beyond the IMU's white noise (rad/s,
     m/s^2)."""
+    found: tuple[str, ...] = ()
+    """Those of `effects` that came to the model because a search or its user found them."""
     priors: tuple[StatedPrior, ...] = ()
     """Of single coefficients, in the place of what the IMU's file says of all of an effect."""

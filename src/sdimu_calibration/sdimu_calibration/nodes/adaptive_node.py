@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -80,7 +80,7 @@ class AdaptiveNode:
         self._stop, self._begin_ns, self._end_ns = 0, 0, 0
         self._look_at, self._arrived, self._tries = 0.0, 0.0, 0
         self._made: list[dict[str, object]] = []
-        self._adding: Iterator[str | None] | None = None
+        self._adding: Iterator[None] | None = None
 
     def close(self) -> None:
         """Leave no table in motion and no process behind."""
@@ -91,7 +91,9 @@ class AdaptiveNode:
 
     def _act(self, angles: Floats) -> None:
         if self._adding is not None:
-            self._add()
+            if next(self._adding, self) is self:
+                self._adding = None
+                self._driving.end()
             return
         if self._next is None:
             self._look(tuple(angles.tolist()))
@@ -155,19 +157,17 @@ class AdaptiveNode:
             return
         if decision.reached and decision.decided:
             # The limits hold beside what was found: so the result has it.
-            self._adding = ask_to_add(self.node, decision.decided)
+            self._adding = self._added(decision.decided)
         else:
             self._driving.end()
 
-    def _add(self) -> None:
-        """Wait for what is found to come into the model, then end."""
-        answer = next(self._adding, "") if self._adding else ""
-        if answer is None:
-            return
-        if answer:
-            self.node.get_logger().warning(f"the result lacks {', '.join(self._last.decided)}: {answer}")
-        self._adding = None
-        self._driving.end()
+    def _added(self, effects: Sequence[str]) -> Iterator[None]:
+        """Let the calibration node take effects into the model, one after the other: one that it refuses is told."""
+        for effect in effects:
+            for answer in ask_to_add(self.node, [effect]):
+                if answer:
+                    self.node.get_logger().warning(f"{effect} was not added to the model of the result: {answer}")
+                yield
 
     def _publish(self, decision: Decision) -> None:
         words = "" if decision.step is None else decision.step.words

@@ -139,8 +139,9 @@ def where_it_fails(found: SetDiagnosis, draw: Draw) -> str:
         "Where it fails: sensor by stop",
         switched(draw(upon_each_other(maps, _MAP)), ("model as given", "with what was found")[: len(maps)]),
         quiet(
-            "A cell is the error that a sensor of a recording has in a stop beyond the joint estimate, over its sigma "
-            f"in white noise. It counts beyond {NOTABLE:.0f}: of 200 cells, one is chance.{some}"
+            "A cell is the error that a sensor of a recording has in a stop beyond the joint estimate, over its sigma; "
+            "both maps are in the noise beside what was found. It counts beyond "
+            f"{NOTABLE:.0f}: of 200 cells, one is chance.{some}"
         ),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -29,9 +30,11 @@ from sdimu_calibration.storage.opening import Source, open_test, with_imu_file
 
 _FILES = frozenset({".mcap", ".db3", ".bag"})
 """Endings of files that are bags by themselves."""
+_KEPT = 4
+"""Number of recordings (1) that a process keeps in memory at most: each with its fit takes some hundred megabytes, and
+six in two processes, which ask them three times and more, are all kept."""
 _KEPT_SAMPLES = 1_200_000
-"""Number of samples (1) of all recordings that a process keeps in memory: half a gigabyte with their fits, and six
-recordings of fifty minutes at 100 Hz in two processes. A set asks the same recordings three times and more."""
+"""Number of samples (1) of all of them: four recordings of fifty minutes at 100 Hz, half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -64,21 +67,28 @@ class BagSource:
 class KeptOpen:
     """Recordings that this process has opened, as many as memory holds: those that were asked for last."""
 
-    def __init__(self, most: int) -> None:
-        """Keep so many samples at most, but one recording of any length."""
-        self._most = most
+    def __init__(self, most: int, samples: int) -> None:
+        """Keep so many recordings and samples at most, but one recording of any length."""
+        self._most, self._samples = most, samples
         self._tests: OrderedDict[tuple[BagSource, tuple[FileState, ...]], PreparedTest] = OrderedDict()
+        self._lock = threading.Lock()
 
     def of(self, source: BagSource, files: tuple[FileState, ...]) -> PreparedTest:
         """Give an opened bag whose files, and those of its IMU and site, are as they are now."""
-        test = self._tests.pop((source, files), None) or source.opened()
-        self._tests[source, files] = test
-        while len(self._tests) > 1 and sum(len(t.recording.t) for t in self._tests.values()) > self._most:
-            self._tests.popitem(last=False)
+        with self._lock:
+            known = self._tests.pop((source, files), None)
+        test = known or source.opened()
+        with self._lock:
+            self._tests[source, files] = test
+            while len(self._tests) > 1 and self._is_too_much():
+                self._tests.popitem(last=False)
         return test
 
+    def _is_too_much(self) -> bool:
+        return len(self._tests) > self._most or sum(len(t.recording.t) for t in self._tests.values()) > self._samples
 
-_OPEN = KeptOpen(_KEPT_SAMPLES)
+
+_OPEN = KeptOpen(_KEPT, _KEPT_SAMPLES)
 """Those of the sets that this process works on."""
 
 

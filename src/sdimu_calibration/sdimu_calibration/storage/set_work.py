@@ -128,12 +128,14 @@ class Pool:
         if any(not isinstance(e, str) for job in jobs for e in (*job.candidates, *job.model.effects)):
             # An effect of the user's own is a function, which no other process knows.
             return _here(jobs, self._told)
-        places = {self._of(job).submit(tried, job): k for k, job in enumerate(jobs)}
+        places = {one.submit(tried, job): k for k, (one, job) in enumerate(zip(self._shared(jobs), jobs, strict=True))}
         found: dict[int, Report | DataError] = {}
         for future in as_completed(places):
             try:
                 found[places[future]] = future.result()
             except BrokenProcessPool as error:
+                for process in self._processes:
+                    process.shutdown(wait=False, cancel_futures=True)
                 raise DataError(
                     "the system ended a process of --workers, usually because memory is short: state fewer; what is "
                     "done stays in the folder evidence of --out"
@@ -142,10 +144,19 @@ class Pool:
                 self._told(len(found), len(jobs))
         return [found[k] for k in range(len(jobs))]
 
-    def _of(self, job: Job) -> Executor:
-        """Give the process of the recording of a job: the next one in turn for a recording that is new."""
-        place = self._place.setdefault(job.member.name, len(self._place))
-        return self._processes[place % len(self._processes)]
+    def _shared(self, jobs: Sequence[Job]) -> list[Executor]:
+        """Give each job the process of its recording, the next one in turn for a new one; what is too much to another.
+
+        No process has more jobs than an even share, so that none works while the others have nothing to do.
+        """
+        count = len(self._processes)
+        own = [self._place.setdefault(job.member.name, len(self._place)) % count for job in jobs]
+        most, load = -(-len(jobs) // count), [0] * count
+        for k, place in enumerate(own):
+            if load[place] == most:
+                own[k] = load.index(min(load))
+            load[own[k]] += 1
+        return [self._processes[place] for place in own]
 
 
 def _from_cluster(on_cluster: Any, jobs: Sequence[Job], told: Told | None) -> list[Report | DataError]:

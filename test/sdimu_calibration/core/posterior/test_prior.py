@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sdimu_calibration.core.diagnosis.candidates import own_equation
 from sdimu_calibration.core.diagnosis.diagnose import climb
-from sdimu_calibration.core.effects.selection import resolve, single_ones
+from sdimu_calibration.core.effects.selection import number_of, of_catalogue, resolve
 from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.estimation.solve import solve, with_effects
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.posterior.prior import KIN, MEAN_NUMBER, prior_of
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_site
+from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_study.worlds import simulated_test
 
 LABELS = ("gyro_delay_y", "gyro_acceleration_sensitivity_yy", "gyro_acceleration_sensitivity_xy", "gyro_bias_wrap_yx")
@@ -62,20 +66,17 @@ def test_what_was_found_and_is_in_the_model_counts_as_what_is_found(candidates):
     assert alone.of(np.array([1, 2])).log_of([0]) == alone.log_of([1])
 
 
-def test_single_coefficients_were_found_and_whole_effects_are_habit():
-    effects = (
-        "gyro_bias",
-        "gyro_g_sensitivity",
-        "accel_quadratic_z",
-        "accel_triad_delay",
-        "gyro_bias_warm_up_y(tau=9 s)",
-    )
-    assert [e.labels for e in single_ones(effects)] == [
-        ("accel_quadratic_z",),
-        ("accel_triad_delay",),
-        ("gyro_bias_warm_up_y(tau=9 s)",),
-    ]
-    assert single_ones(load_model("baseline").effects) == single_ones(load_model("hand").effects) == ()
+def test_what_was_added_was_found_and_what_a_model_lists_is_habit():
+    """However its coefficients are spelled: a model with single axes is as sure of nothing missing as a whole one."""
+    habit = replace(load_model("baseline"), effects=("gyro_misalignment_xy", "accel_triad_delay", "accel_quadratic"))
+    assert habit.found == ()
+    more = ("accel_cubic_z", own_equation("gyro_x: ey^2"), "gyro_scale_quadratic", "gyro_bias_warm_up_y(tau=9 s)")
+    found = of_catalogue(with_effects(habit, more).found)
+    assert [e.family or e.name for e in found] == ["accel_cubic", "gyro_scale_quadratic", "gyro_bias_warm_up"]
+    # A whole effect that is added says that some of it was found.
+    assert number_of(found) == 3
+    model = extended_model("baseline", ["accel_quadratic_z"])
+    assert [e.labels for e in of_catalogue(model.found)] == [("accel_quadratic_z",)]
 
 
 def test_a_certain_effect_that_is_added_changes_no_probability_of_the_others():

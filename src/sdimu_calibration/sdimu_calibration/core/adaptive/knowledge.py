@@ -12,7 +12,7 @@ from sdimu_calibration.core.adaptive.open_class import OpenClass, separation
 from sdimu_calibration.core.adaptive.so_far import SoFar, so_far
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import looked_at
+from sdimu_calibration.core.diagnosis.found import DECIDED, looked_at
 from sdimu_calibration.core.diagnosis.problem import Problem, look_alikes
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.effect import Effect
@@ -61,14 +61,21 @@ def knowledge(found: Diagnosis, goals: Goals) -> Knowledge:
     alike, sizes, needed, place = _class(found)
     named = tuple(c.label for c in found.chosen)
     known = fitted(found.extended, goals, tuple(c.effect for c in alike), named)
-    sure = tuple(one.candidate.label for one in found.found_effects if one.decided and not one.alike)
-    known = replace(known, decided=sure)
+    known = replace(known, decided=_decided(found))
     if not alike:
         return replace(known, verdict=found.verdict)
     count = known.at.own
     columns = (count - len(named) + place, *range(count, count + len(alike)))
     one = OpenClass(named[place], tuple(c.label for c in alike), columns, sizes, needed)
     return replace(known, open=one, verdict=found.verdict)
+
+
+def _decided(found: Diagnosis) -> tuple[str, ...]:
+    """Labels of effects of the catalogue that are sure to be missing, each by itself; none where more is missing."""
+    if found.verdict not in {Verdict.ONE_EFFECT, Verdict.SEVERAL_EFFECTS}:
+        return ()
+    of_unit = [one for one in found.found_effects if one.candidate.effect.scope != "recording"]
+    return tuple(one.candidate.label for one in of_unit if one.of_family >= DECIDED and not one.alike)
 
 
 def fitted(fit: Fit, goals: Goals, alike: Sequence[Effect] = (), named: tuple[str, ...] = ()) -> Knowledge:

@@ -24,21 +24,18 @@ def resolve(named: str | Effect) -> Effect:
     return effect.only(parameters) if parameters else effect
 
 
-def single_ones(effects: Iterable[str | Effect]) -> tuple[Effect, ...]:
-    """Effects of a model that somebody added because they were found: of a catalogue's effect some coefficients alone.
-
-    A whole effect of several coefficients is there by habit, and says nothing of the sensor.
-    """
-    every = map(resolve, effects)
-    return tuple(e for e in every if _is_single(e))
+def of_catalogue(effects: Iterable[str | Effect]) -> tuple[Effect, ...]:
+    """Effects of a registry among some: no equation that no physics names."""
+    return tuple(e for e in map(resolve, effects) if (e.family or e.name) in registry.names())
 
 
-def _is_single(effect: Effect) -> bool:
-    family = effect.family or effect.name
-    if family not in registry.names():
-        return False
-    whole = len(registry.get(family).parameters)
-    return whole == 1 or len(effect.parameters) < whole
+def number_of(effects: Iterable[Effect]) -> int:
+    """Count effects of a catalogue: coefficients that stand alone, and a whole effect as one."""
+    return sum(1 if _is_whole(effect) else len(effect.parameters) for effect in effects)
+
+
+def _is_whole(effect: Effect) -> bool:
+    return len(effect.parameters) == len(registry.get(effect.family or effect.name).parameters)
 
 
 def refuse_size(key: EffectKey) -> None:

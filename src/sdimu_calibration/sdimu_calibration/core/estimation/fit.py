@@ -17,7 +17,7 @@ from sdimu_calibration.core.data.blocks import let_go, pieces
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.references import told_of
-from sdimu_calibration.core.effects.selection import single_ones
+from sdimu_calibration.core.effects.selection import of_catalogue
 from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.evidence.consistency import Consistency
@@ -209,8 +209,8 @@ class Fit(ABC):
 
     @property
     def found(self) -> tuple[Effect, ...]:
-        """Effects of the model that somebody added because they were found, as of `single_ones`."""
-        return single_ones(self.model.effects)
+        """Effects of the catalogue that came to the model because somebody found them."""
+        return of_catalogue(self.model.found)
 
     @abstractmethod
     def evidence(self, effects: Sequence[Effect] = ()) -> LinearEvidence:

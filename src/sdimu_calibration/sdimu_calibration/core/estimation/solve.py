@@ -183,11 +183,12 @@ def extend(
 
 
 def with_effects(model: Model, effects: Sequence[Effect | str]) -> Model:
-    """Return the model with more effects.
+    """Return the model with more effects, which somebody found.
 
     A model names its effects; one that no registry knows stands for itself, as `imu_model.build` takes it.
     """
-    return replace(model, effects=cast("tuple[str, ...]", (*model.effects, *effects)))
+    more = cast("tuple[str, ...]", tuple(effects))
+    return replace(model, effects=(*model.effects, *more), found=(*model.found, *more))
 
 
 def _setup(test: PreparedTest, model: Model) -> TestSetup:

@@ -68,7 +68,8 @@ class LinearEvidence(ABC):
     noise: InStops | None = field(default=None, kw_only=True)
     """Signatures of the modes of noise with a memory, N rows and r columns; None without any."""
     found: tuple[Effect, ...] = field(default=(), kw_only=True)
-    """Effects of the model that were found, as of `single_ones`: a sensor that has some is likelier to have more."""
+    """Effects of the catalogue that came to the model because they were found: a sensor that has some is likelier to
+    have more."""
     inner: InnerNoise | None = field(default=None, kw_only=True)
     """Noise that moves within stretches, in which all rows are whitened; None where white noise alone is there."""
     worked_out: InitVar[Information | None] = field(default=None, kw_only=True)

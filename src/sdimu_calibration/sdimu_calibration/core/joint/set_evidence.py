@@ -13,7 +13,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.effect import Effect
-from sdimu_calibration.core.effects.selection import single_ones
+from sdimu_calibration.core.effects.selection import of_catalogue
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.held_out import HeldOut, predict
 from sdimu_calibration.core.evidence.in_stops import InStops
@@ -82,7 +82,7 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
         imu=imu,
         times=fit.reports[0].times,
         coefficients=P - sum(map(is_weight, fit.names)),
-        found=single_ones(fit.model.effects),
+        found=of_catalogue(fit.model.found),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from sdimu_calibration.core.effects.accelerometer_frame import are_large
 from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
-from sdimu_calibration.core.estimation.solve import AUTO, with_effects
+from sdimu_calibration.core.estimation.solve import AUTO
 from sdimu_calibration.core.filter.solution import MOST_WIDENINGS
 from sdimu_calibration.core.joint.combine import Combination, Component, JointEstimate, Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight, widened
@@ -169,8 +169,8 @@ def fit_set(
             f"priors.{options.model.priors[0].name}: a set takes the priors of the IMU's file alone: leave them out of "
             "the model"
         )
-    bare = replace(options.model, effects=())
-    options = replace(options, model=with_effects(bare, [by_name(e) for e in options.model.effects]))
+    effects = cast("tuple[str, ...]", tuple(by_name(e) for e in options.model.effects))
+    options = replace(options, model=replace(options.model, effects=effects))
     progress("recordings", 0.1)
     jobs = [_first_job(member, options, before) for member in members]
     in_white = {job.member.name for job in jobs if job.noise == ()}

@@ -22,6 +22,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.effects.effect import OF_ONE_TIME, Effect
+from sdimu_calibration.core.effects.selection import number_of
 from sdimu_calibration.core.effects.usual import usual
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.posterior.neighbours import odds_beside
@@ -242,7 +243,7 @@ def prior_of(
         np.array([c.family == "own" for c in candidates], dtype=bool),
         np.where([c.effect.bias_drift for c in candidates], axes, -1).astype(np.int64),
         np.arange(len(names)) if J is None else twins(J),
-        sum(len(one.parameters) for one in found),
+        number_of(found),
     )
 
 

@@ -170,19 +170,23 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
     effects: list[Effect] = []
     for text in model.effects:
         effects += _parts(find_effects(_beside(folder, text)), effects)
+    begun = len(effects)
     for text in added:
         effects += new_parts(find_effects(text), effects, text)
     # A model names its effects; `imu_model.build` takes an effect itself as well.
-    return replace(model, effects=cast("tuple[str, ...]", tuple(effects)))
+    whole = cast("tuple[str, ...]", tuple(effects))
+    return replace(model, effects=whole, found=whole[begun:])
 
 
 def added_to(name: str, effects: Sequence[str]) -> list[str]:
-    """Effects of the catalogue in the model of a result that came to those it began with. `name`: that model."""
+    """Effects and equations in the model of a result that came to those it began with. `name`: that model."""
     begun = {label for effect in extended_model(name, ()).effects for label in selection.resolve(effect).labels}
     added = []
-    for effect in effects:
+    for text in effects:
+        # The name of an effect that a file of the user has is none that can be added.
         with suppress(DataError):
-            added += [] if begun.issuperset(selection.resolve(effect).labels) else [effect]
+            labels = {label for effect in find_effects(text) for label in effect.labels}
+            added += [] if labels <= begun else [text]
     return added
 
 

@@ -16,8 +16,9 @@ from pathlib import Path
 from sdimu_calibration.core.data_error import DataError
 
 RESULT = "result.json"
-COMPANIONS = ("report.html", "report.pdf", "diagnosis.json")
-"""Files that speak of the result.json beside them: those of an earlier run go when a new one comes."""
+COMPANIONS = ("report.html", "report.pdf", "diagnosis.json", "set.json")
+"""Files that speak of the result.json beside them: those of an earlier run go when a new one comes. set.json
+was the diagnosis of a set before diagnosis.json held it."""
 
 
 def _named(error: OSError, path: Path) -> OSError:
