@@ -68,12 +68,13 @@ def test_figures_out_of_sight_are_drawn_without_scrolling(browser: Any, report: 
     if not tells_when_idle:
         page.add_init_script("window.requestIdleCallback = undefined")
     page.goto(report.as_uri())
-    folded = "[...document.querySelectorAll('.figure')].filter(e => !e.clientWidth)"
-    page.wait_for_function(f"document.querySelectorAll('.figure:not([data-drawn])').length === {folded}.length")
+    folded = page.locator("details:not([open]) .figure").count()
+    assert folded > 0
+    page.wait_for_function(f"document.querySelectorAll('.figure:not([data-drawn])').length === {folded}")
     drawn = page.locator(".figure .main-svg").evaluate_all("all => all.map(e => e.getBoundingClientRect().top)")
     assert max(drawn) > 2 * 900
     assert page.evaluate("window.scrollY") == 0
-    assert page.evaluate(f"{folded}.filter(e => e.dataset.drawn).length") == 0
+    assert page.locator("details:not([open]) .figure[data-drawn]").count() == 0
     page.close()
 
 
@@ -118,6 +119,9 @@ def test_no_label_of_a_figure_crosses_another(browser: Any, report: Path, width:
     page.evaluate("sdimuDrawAll()")
     page.wait_for_function("document.querySelectorAll('.figure:not([data-drawn])').length === 0")
     assert crossing_labels(page) == []
+    words = "[...document.querySelectorAll('.figure .textpoint text')]"
+    over = f"{words}.map(e => e.getBoundingClientRect().right - e.closest('.figure').getBoundingClientRect().right)"
+    assert max(page.evaluate(over)) <= 0
     page.close()
 
 

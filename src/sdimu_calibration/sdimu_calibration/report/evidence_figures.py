@@ -137,6 +137,7 @@ def ranking(
     marks = ["\N{BLACK RIGHT-POINTING TRIANGLE} " if s.chosen else "" for s in shown]
     names = [m + literal(s.label) for m, s in zip(marks, shown, strict=True)]
     found = [told.get(s.coefficient, MayBe()) for s in shown]
+    words = [beside(_size(s), one.probability) for s, one in zip(shown, found, strict=True)]
     figure = Figure()
     figure.add(
         "bar",
@@ -160,7 +161,7 @@ def ranking(
         x=[max(abs(s.z), threshold) for s in shown],
         mode="text",
         customdata=[one.probability for one in found],
-        text=[beside(_size(s), one.probability) for s, one in zip(shown, found, strict=True)],
+        text=words,
         textposition="middle right",
         cliponaxis=False,
         hoverinfo="skip",
@@ -173,8 +174,8 @@ def ranking(
     figure.annotate(
         f"noise reaches {threshold:.1f}", x=threshold, y=1, yref="y domain", xanchor="center", yanchor="bottom"
     )
-    top = max([abs(s.z) for s in shown] + [threshold])
-    figure.x_axes(title="score |z| (sigma)", range=[0, _BESIDE * top])
+    ends = [max(abs(s.z), threshold) / (1.0 - _CHARACTER * len(text)) for s, text in zip(shown, words, strict=True)]
+    figure.x_axes(title="score |z| (sigma)", range=[0, max(ends, default=threshold)])
     figure.y_axes(range=[len(shown) - 0.5, -0.5], ticks="", automargin=True, title="candidate")
     # A category stays the label, by which a click takes it.
     alike = [m + literal(bar_name(s, one)) for m, s, one in zip(marks, shown, found, strict=True)]
@@ -183,8 +184,8 @@ def ranking(
     return lay_out(figure, 24 * len(shown) + 150, showlegend=True, margin=margin, legend=_LEGEND)
 
 
-_BESIDE = 1.55
-"""Width of the axis of candidates as a multiple of the longest bar: its size stands beside it in a window of 800 px."""
+_CHARACTER = 0.021
+"""Width of a character behind a bar as a share of the axis of candidates (1): in a window of 800 px none is cut."""
 FAMILY_INK = {"gyro": "@gyro", "accelerometer": "@accel", "other": MUTED}
 """Ink of a bar by what its effect acts on."""
 ASIDE = 0.45

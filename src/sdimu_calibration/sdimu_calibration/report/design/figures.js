@@ -108,7 +108,7 @@
   }
   function rest() {
     load().then(function () {
-      var place = queue.length ? null : all().find(function (p) { return !p.dataset.drawn && p.clientWidth; });
+      var place = queue.length ? null : all().find(function (p) { return !p.dataset.drawn && !p.closest('details:not([open])'); });
       if (place) { draw(place); }
       if (place || queue.length) { whenIdle(rest); }
     });
