@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import pytest
+import typer
 
 from sdimu_calibration.cli.datasheet import datasheet
 from sdimu_calibration.cli.fleet import fleet
@@ -80,7 +81,9 @@ def test_verdict_and_limits_are_on_the_first_screen_and_nothing_is_wider_than_a_
     limits.write_text(
         "format: sdimu-limits/1\nlimits:\n  gyro bias: 100 deg/h\n  gyro angle random walk: 1 deg/sqrt(h)\n"
     )
-    datasheet([folder], certificate=True, operator="A. Person", limits=limits)
+    with pytest.raises(typer.Exit) as ended:
+        datasheet([folder], certificate=True, operator="A. Person", limits=limits)
+    assert ended.value.exit_code == 3
     opened.set_viewport_size({"width": 800, "height": 1000})
     opened.goto(f"file://{folder / 'datasheet.html'}")
     assert opened.evaluate("document.documentElement.scrollWidth") <= 800

@@ -122,7 +122,7 @@ def diagnose_set(
         before,
         facts.after if found.stood else facts.after.warned(TO_AND_FRO),
         found.threshold,
-        (*kept, *_advice(word, facts.findings, _closing(found.after, standing), steps)),
+        recorded_first((*kept, *_advice(word, facts.findings, _closing(found.after, standing), steps))),
         standing,
         found.first,
         again,
@@ -283,4 +283,4 @@ def _advice(
         out.append(Advice(Kind.RECORD_MORE))
     if word == Verdict.UNEXPLAINED and not any(one.kind == Kind.LOOK_AT_RECORDING for one in steps):
         out.append(Advice(Kind.ONE_BY_ONE))
-    return recorded_first(out)
+    return tuple(out)
