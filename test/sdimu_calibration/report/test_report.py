@@ -88,6 +88,9 @@ def test_a_page_with_the_coefficients_of_the_model_as_given_calls_them_no_means(
     of_run = page(diagnosis.before, Contents("x", summary=summarise(diagnosis)))
     assert means not in of_run
     assert "The table of coefficients is of one model" in of_run
+    # Where nothing was found the names are the same, and the values need not be.
+    moved = replace(diagnosis.after, values=diagnosis.after.values + 1e-9)
+    assert means not in page(moved, Contents("x", summary=summarise(diagnosis)))
 
 
 def test_the_contents_name_every_card_of_the_page_in_its_order(text):

@@ -8,7 +8,8 @@ limit, what was found, what is open), also logged; ~/moves and ~/question as of 
 leaves choices.json in `out`.
 
 What was recorded is read from the journal of the calibration node, in the folder `out` that both are given: the same
-samples, opened by the same options, as the calibration at the end of the test.
+samples, opened by the same options, as the calibration at the end of the test. Where all limits hold, effects that are
+sure to be missing are added to the parameter ``add`` of the calibration node, so that its result has them.
 """
 
 from __future__ import annotations

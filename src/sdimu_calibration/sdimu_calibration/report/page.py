@@ -159,7 +159,8 @@ def _lacks(calibration: Calibration, summary: DiagnosisSummary | None) -> tuple[
 
 def _means(calibration: Calibration, summary: DiagnosisSummary) -> bool:
     """Whether the coefficients of the page are those of the diagnosis, and not of a model as it was given."""
-    return calibration.names == summary.diagnosis.after.names
+    after = summary.diagnosis.after
+    return calibration.names == after.names and np.array_equal(calibration.values, after.values)
 
 
 def _evidence(summary: DiagnosisSummary, more: ReportExtras, means: bool, spell: Spell | None, draw: Draw) -> list[str]:

@@ -3,10 +3,15 @@
 import math
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
 
 from sdimu_calibration.core.adaptive import Goals, Menu, fitted, question
+from sdimu_calibration.core.adaptive.knowledge import _decided
 from sdimu_calibration.core.adaptive.question import Situation, next_move
 from sdimu_calibration.core.diagnosis.live_diagnosis import LiveDiagnosis
+from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.goal_file import load_goals
 from sdimu_calibration.storage.files.table_file import load_rate_table
 
@@ -61,3 +66,24 @@ def test_an_end_is_reached_only_after_a_search(monkeypatch):
     decision = next_move(fit, consistent(2.0), asked(wide))
     assert decision.reached
     assert searched == [fit]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "of_family", "alike", "scope", "sure"),
+    [
+        (Verdict.ONE_EFFECT, 0.96, (), "unit", True),
+        (Verdict.SEVERAL_EFFECTS, 0.96, (), "unit", True),
+        (Verdict.SEVERAL_EFFECTS, 0.94, (), "unit", False),
+        (Verdict.SEVERAL_EFFECTS, float("nan"), (), "unit", False),
+        (Verdict.SEVERAL_EFFECTS, 0.96, ("other",), "unit", False),
+        (Verdict.SEVERAL_EFFECTS, 0.96, (), "recording", False),
+        (Verdict.UNEXPLAINED, 0.96, (), "unit", False),
+        (Verdict.OWN_EQUATION, 0.96, (), "unit", False),
+    ],
+)
+def test_an_effect_is_decided_by_itself_under_a_verdict_that_stands_by_it(verdict, of_family, alike, scope, sure):
+    """What is decided goes into the model of the result: nothing that was only tried, or is open, or of no sensor."""
+    candidate = SimpleNamespace(label="an effect", effect=SimpleNamespace(scope=scope))
+    one = SimpleNamespace(candidate=candidate, of_family=of_family, alike=alike)
+    found = SimpleNamespace(verdict=verdict, found_effects=(one,))
+    assert _decided(found) == (("an effect",) if sure else ())
