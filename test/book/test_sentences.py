@@ -18,7 +18,7 @@ def sentences(text: str, ends: str) -> Iterator[str]:
     for part in re.split(r"\n\s*\n|\n(?=\s*- )|(?<=\|)\n", re.sub(r"```.*?```", "", text, flags=re.DOTALL)):
         lines = [line for line in part.strip("\n").split("\n") if not line.startswith(NO_PROSE)]
         prose = re.sub(r"\]\([^)]*\)", "]", " ".join(lines))
-        yield from re.split(rf"(?<=[{ends}])\s+", prose)
+        yield from re.split(rf"(?<=[{ends}])\*?\s+", prose)
 
 
 @pytest.mark.parametrize(("page", "ends"), [("README.md", ".!?"), ("doc/sets.md", ".!?:;")])
