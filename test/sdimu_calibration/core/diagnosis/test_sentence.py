@@ -72,6 +72,11 @@ def test_probabilities_of_one_list_add_up_in_the_sentence_and_in_the_table(summa
     assert [row[4] for row in rows] == ["52 %", "48 %"]
 
 
+def test_a_sentence_says_how_likely_none_of_those_that_it_names_is_it(summary):
+    told = said(with_shares(summary, 0.97, (own(summary), 0.58), ("accel_cubic_x", 0.21)))
+    assert told.endswith(f") 58 %, {named('accel_cubic_x')} 21 % or another one 18 %.")
+
+
 def test_shares_beyond_all_are_said_to_be_of_two_that_may_be_there(summary):
     told = said(with_shares(summary, 0.92, (own(summary), 0.6), ("accel_cubic_x", 0.43)))
     assert told.endswith("43 %; two of them may be there.")

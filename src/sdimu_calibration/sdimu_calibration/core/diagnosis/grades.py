@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -129,12 +130,15 @@ def _likely(one: Graded) -> str:
 
 
 def _open(one: Graded) -> str:
-    """Name what it may be, each with its probability; the likeliest with its size."""
+    """Name what it may be, each with its probability; the likeliest with its size, and how likely none of them is it."""
     sizes = {one.coefficient: f" ({one.size})"}
     shown = one.may_be[:LISTED]
     percent = percents_of(one.may_be)
     told = [f"{named(s.name)}{sizes.get(s.name, '')} {percent[s.name]}" for s in shown]
-    both = "; two of them may be there" if sum(s.probability for s in shown) > _MORE_THAN_ONE else ""
+    together = math.fsum(s.probability for s in shown)
+    rest = round(100.0 * one.probability) - round(100.0 * together)
+    told += [f"another one {rest} %"] if rest > 0 else []
+    both = "; two of them may be there" if together > _MORE_THAN_ONE else ""
     of_family = f"{one.family} - " if one.family else ""
     return f"{of_family}{', '.join(told[:-1])} or {told[-1]}{both}" if len(told) > 1 else told[0]
 
