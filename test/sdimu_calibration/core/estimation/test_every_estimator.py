@@ -127,6 +127,18 @@ def test_a_fit_answers_every_question(case):
     assert abs(wider.values[-1]) < 5.0 * sigma
 
 
+def test_models_that_stay_open_move_and_widen_what_a_fit_states(case):
+    fit, name = fit_of(case), "accel_scale_x"
+    evidence, k = fit.evidence(), fit.names.index(name)
+    count, place = len(evidence.weight), evidence.names.index(name)
+    sigma = np.sqrt(fit.covariance[k, k])
+    doubt, moved = np.zeros((count, count)), np.zeros(count)
+    doubt[place, place], moved[place] = (3.0 * sigma) ** 2, 2.0 * sigma
+    over = fit.with_doubt(doubt, moved)
+    assert (over.values - fit.values)[k] == pytest.approx(2.0 * sigma, rel=1e-3)
+    assert over.covariance[k, k] == pytest.approx(10.0 * sigma**2, rel=1e-3)
+
+
 def test_a_fit_is_diagnosed_and_shown(case, tmp_path):
     summary = summarise(climb(fit_of(case)))
     write_diagnosis(tmp_path / "diagnosis.json", summary)

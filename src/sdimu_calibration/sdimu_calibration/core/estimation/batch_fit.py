@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import Effect, Timetable
@@ -42,12 +43,18 @@ class BatchFit(Fit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
-        return self.coefficients
+        return self.coefficients if self.moved is None else self.coefficients + self._opened.values - self.about.values
 
     @property
     def covariance(self) -> Floats:
         """Covariance of `values`, shape (p, p)."""
-        return self.coefficient_covariance
+        C = self.coefficient_covariance
+        return C if self.doubt is None else C + self._opened.covariance - self.about.covariance
+
+    @cached_property
+    def _opened(self) -> NavigationFit:
+        """The navigation about this fit over all models that stay open, whose columns are those of its evidence."""
+        return self.about.with_doubt(self.doubt, self.moved)
 
     def reported_values(self, settled: Floats) -> Floats:
         """Bring coefficients of the navigation about this fit into its frame."""

@@ -53,7 +53,8 @@ class HandheldFit(Fit):
     @property
     def values(self) -> Floats:
         """Coefficients (SI), shape (p,)."""
-        return self.solution.point.coefficients[: len(self.names)]
+        best = self.solution.point.coefficients[: len(self.names)]
+        return best if self.moved is None else best + self.reported_values(self.moved)
 
     @property
     def covariance(self) -> Floats:
