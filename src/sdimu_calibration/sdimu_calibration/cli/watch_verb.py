@@ -60,7 +60,7 @@ def watch(
 
     page.check()
     test = watched(domain)
-    outline, first = _outline(test, model, tuple(add or ()))
+    outline, first = outlined(test, model, tuple(add or ()))
     waited = test is None and _waited(domain, make_console(), seconds)
     used = _entered(domain, test)
     # The domain is read when ROS is loaded.
@@ -195,13 +195,17 @@ def _entered(domain: int | None, test: RunningTest | None) -> int:
     return stated_domain() or 0
 
 
-def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]) -> tuple[Outline, dict[str, float]]:
-    """Outline of a test, and sigmas (SI) at its begin by coefficient: those of the IMU's file, where it is known."""
+def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]) -> tuple[Outline, dict[str, float]]:
+    """Outline of a test, and sigmas (SI) at its begin by coefficient: those of the IMU's file, where it is known.
+
+    Those of the catalogue are among them: an effect may be added at any time, by whoever watches.
+    """
     import numpy as np
 
     from sdimu_calibration.core.effects import selection
     from sdimu_calibration.core.effects.body_frame import frame_jacobian
     from sdimu_calibration.core.effects.imu_model import prior_size
+    from sdimu_calibration.core.effects.registry import get, names
     from sdimu_calibration.report.live_seen import Outline
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.effect_file import extended_model
@@ -213,11 +217,12 @@ def _outline(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     if test is None:
         return Outline(0.0, 0, keys, units), {}
     imu = load_imu(test.imu)
-    size = np.array([prior_size(effect, imu) or 0.0 for effect in effects for _ in effect.parameters])
+    sizes = np.array([prior_size(effect, imu) or 0.0 for effect in effects for _ in effect.parameters])
     # Published sigmas are those in the body frame, to which misalignments of both triads add up.
     J = frame_jacobian(list(units), chosen.body_frame)
-    first = dict(zip(units, np.sqrt((J**2) @ size**2).tolist(), strict=True))
-    return Outline(test.duration_s, test.stops, keys, units), first
+    first = dict(zip(units, np.sqrt((J**2) @ sizes**2).tolist(), strict=True))
+    later = {q.name: size for e in map(get, names()) if (size := prior_size(e, imu)) for q in e.parameters}
+    return Outline(test.duration_s, test.stops, keys, units), {**later, **first}
 
 
 @dataclass(frozen=True)

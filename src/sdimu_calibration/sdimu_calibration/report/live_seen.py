@@ -23,7 +23,7 @@ class Progress:
     sigmas: dict[str, float] = field(default_factory=dict)
     """Sigma (SI) by coefficient, as last published."""
     first: dict[str, float] = field(default_factory=dict)
-    """The first sigma published."""
+    """Sigma (SI) by coefficient at the begin of the test; of one that nobody knew before, the first published."""
     nis: dict[str, float] = field(default_factory=dict)
     """Mean squared innovation per degree of freedom at the present stop, by channel."""
     verdict: str = ""

@@ -103,6 +103,7 @@ def run(
 
     from sdimu_calibration.cli.console import console as make_console
     from sdimu_calibration.cli.processes import Children, own_domain, own_folder
+    from sdimu_calibration.cli.watch_verb import outlined
     from sdimu_calibration.core.compiled import still_to_compile
     from sdimu_calibration.report.live_page.record import LiveRecord
 
@@ -114,8 +115,8 @@ def run(
     if test.adaptive is not None:
         duration = _choosing(options, test.adaptive, test.ask, test.tell or [])
     console = make_console()
-    outline = _test(None if test.adaptive else test.followed, test.model, duration)
     about = _about(options, test, duration, out)
+    outline, first = outlined(about, None, ())
     record = LiveRecord(outline, about.folder, about.words)
     with own_folder(out), LivePage(page, record, console) as shown:
         begun = time.monotonic()
@@ -126,7 +127,7 @@ def run(
                 console.print("compiling the numerical loops, once on this machine: up to a minute without samples")
             _start(children, options, out / "bag", replace)
             shown.begin()
-            streamed = _watch(console, children, outline, record)
+            streamed = _watch(console, children, outline, first, record)
         record.tell("the report is being made")
         wall = time.monotonic() - begun
         end = _tell_choices(console, out / "choices.json") if test.adaptive is not None else None
@@ -286,14 +287,17 @@ def _start(children: Children, options: dict[str, dict[str, Any]], bag: Path, re
         children.start("adaptive", "sdimu_calibration.nodes.adaptive_node", options["adaptive"])
 
 
-def _watch(console: Console, children: Children, test: Outline, record: LiveRecord) -> float:
-    """Show the progress until every node has left; wall time (s) that the data took."""
+def _watch(console: Console, children: Children, test: Outline, sigmas: dict[str, float], record: LiveRecord) -> float:
+    """Show the progress until every node has left; wall time (s) that the data took.
+
+    `sigmas`: those at the begin (SI), by coefficient.
+    """
     import time
 
     from sdimu_calibration.cli.watch import Watch
     from sdimu_calibration.nodes.monitor import Monitor
 
-    monitor = Monitor()
+    monitor = Monitor(first=sigmas)
     moved = time.monotonic()
     first: float | None = None
     streamed = 0.0
@@ -318,19 +322,6 @@ def _watch(console: Console, children: Children, test: Outline, record: LiveReco
     finally:
         monitor.close()
     return streamed
-
-
-def _test(plan: str | None, model: str, duration: float) -> Outline:
-    """Collect what is known of the test before it runs."""
-    from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.report.live_seen import Outline
-    from sdimu_calibration.storage.files.config import load_plan
-    from sdimu_calibration.storage.files.effect_file import extended_model
-
-    effects = [selection.resolve(e) for e in extended_model(model, ()).effects]
-    units = {q.name: q.display_unit for effect in effects for q in effect.parameters}
-    stops = 0 if plan is None else len(load_plan(plan).dwell_s)
-    return Outline(duration, stops, [effect.key for effect in effects], units)
 
 
 def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
