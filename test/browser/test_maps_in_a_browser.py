@@ -65,6 +65,21 @@ def test_no_number_is_wider_than_its_cell(browser: Any, maps: Path, width: int) 
         assert one["least"] >= 9.5, one
 
 
+@pytest.mark.parametrize("columns", [40, 56])
+def test_what_stands_out_has_its_sign_however_many_stops_there_are(browser: Any, tmp_path: Path, columns: int) -> None:
+    """A map of a set of recordings came with signs already, and the page took them for no numbers."""
+    value = np.zeros((6, columns))
+    value[2, 7], value[5, 30] = 9.0, -4.0
+    body = html(heat_map(data.Grid(np.arange(columns), value), tuple("abcdef")), 1)
+    (tmp_path / "map.html").write_text(document("Map", body), encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1000, "height": 900})
+    page.goto((tmp_path / "map.html").as_uri())
+    page.evaluate("sdimuDrawAll()")
+    found = page.locator(".heatmap-label text, .heatmaplayer text").all_text_contents()
+    page.close()
+    assert sorted(text for text in found if text.strip()) == ["+", "\N{MINUS SIGN}"]
+
+
 _LEAST_PX = {1440: 225, 3840: 338}
 """Least height of the map of a first screen (px), by the width of the window: `LEAST` of design/figures.js."""
 _LOWEST = """document.addEventListener('DOMContentLoaded', () => {

@@ -49,7 +49,7 @@
   }
 
   // Numbers stand in the cells of a map where they fit, smaller in cells that are not WIDE (px); where they do not, the
-  // sign of what stands out, and all on hover.
+  // sign of what stands out, and all on hover. A map of many stops comes with signs, which are no numbers: they stay.
   function fitNumbers(figure, width) {
     var room = width - figure.layout.margin.l - figure.layout.margin.r - BAR;
     figure.data.forEach(function (trace) {
@@ -57,7 +57,7 @@
       if (trace.type !== 'heatmap' || !trace.texttemplate || !(cell < WIDE)) { return; }
       if (cell >= CELL) { trace.textfont.size *= cell / WIDE; return; }
       trace.text = trace.text.map(function (row) {
-        return row.map(function (text) { return Math.abs(Number(text.replace('\u2212', '-'))) >= NOTABLE ? text.charAt(0) : ''; });
+        return row.map(function (text) { return Math.abs(Number(text.replace('\u2212', '-'))) < NOTABLE ? '' : text.charAt(0); });
       });
     });
   }
