@@ -119,6 +119,14 @@ def test_every_free_coefficient_has_a_line_that_ends_at_its_sigma(calibration):
     assert ends["gyro_bias_x"] == pytest.approx(last, rel=1e-6)
 
 
+def test_the_page_says_why_a_line_ends_below_the_sigma_of_the_table(calibration):
+    """A sigma of 2.8 ppm stood above a line that ended at 0.8, and nothing said why."""
+    told = "The sigmas of the table are over all models that the data leave open."
+    assert told not in page(calibration, Contents("x"))
+    averaged = replace(calibration, conditional_sigma=0.5 * np.sqrt(np.diag(calibration.covariance)))
+    assert told in page(averaged, Contents("x"))
+
+
 def test_lines_of_a_panel_differ_without_colour(calibration):
     figure = sigma_history(calibration)
     dashes = [trace["line"]["dash"] for trace in figure.data if trace["name"].startswith("gyro_bias")]

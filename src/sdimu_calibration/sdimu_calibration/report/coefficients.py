@@ -56,7 +56,9 @@ def coefficients_section(
     if isinstance(fit, NavigationFit):
         drawn.append(influence_part(fit, draw))
     if len(calibration.history.t):
-        told = quiet("Last pass. Grey: the table turns, no measurements.")
+        wider = " The sigmas of the table are over all models that the data leave open."
+        alone = "" if calibration.conditional_sigma is None else wider
+        told = quiet(f"Last pass, in this model. Grey: the table turns, no measurements.{alone}")
         drawn.append(folded("Sigma of every coefficient against time", told, draw(sigma_history(calibration))))
     told = f"Of the model as given, which lacks {escape(', '.join(lacking))}: these are off as the first screen says."
     return section(
