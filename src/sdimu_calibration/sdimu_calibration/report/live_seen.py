@@ -56,6 +56,11 @@ class Outline:
     units: Mapping[str, str]
     """Customary unit by coefficient."""
 
+    @property
+    def at_most(self) -> str:
+        """What stands before its length: a test that chooses its turns knows the longest only, and no stops."""
+        return "" if self.stops else "at most "
+
 
 def place_words(test: Outline, seen: Progress) -> str:
     """Say at which stop a test is, and whether it turns."""
@@ -65,7 +70,7 @@ def place_words(test: Outline, seen: Progress) -> str:
 
 def time_words(test: Outline, seen: Progress) -> str:
     """Say how far a test is, in seconds of its data."""
-    of = f" of {test.duration_s:.0f}" if test.duration_s else ""
+    of = f" of {test.at_most}{test.duration_s:.0f}" if test.duration_s else ""
     return f"{seen.table_s:.0f}{of} s"
 
 
@@ -76,4 +81,4 @@ def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
     pace = seen.table_s / wall_s
     rest = max(0.0, test.duration_s - seen.table_s) / pace
     words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
-    return f"{words} left at {pace:.3g} times real time"
+    return f"{test.at_most}{words} left at {pace:.3g} times real time"

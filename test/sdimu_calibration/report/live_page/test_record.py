@@ -65,6 +65,14 @@ def test_the_head_says_stop_time_and_share():
     assert head.share == pytest.approx(1.0 / 3.0)
 
 
+def test_of_a_test_that_chooses_its_turns_the_longest_time_is_told_as_such():
+    """One that ended after 3 min had "of 1800 s, 5 min left" all the time."""
+    chooses = replace(TEST, stops=0)
+    record = LiveRecord(chooses)
+    record.take(Now(), True, 3.0)
+    assert record.view().head.time == "300 of at most 900 s, at most 6 s left at 100 times real time"
+
+
 def test_an_effect_that_was_added_has_a_curve_and_a_unit_of_its_own():
     # Its name begins as that of an effect of the model.
     name = "gyro_scale_asymmetry_x"
