@@ -90,18 +90,20 @@ def test_a_recording_counts_once_where_a_joint_result_has_it(batch):
     assert found.apart == ("unit1_0: its recording is one of the set joint, which is counted",)
 
 
-def test_results_of_which_none_is_left_are_refused_in_a_line(batch, tmp_path):
-    folder = batch(units=1)
-    one = read_result(folder / "unit0_0")
+def test_a_recording_counts_where_the_joint_result_that_has_it_does_not(batch):
+    """Its unit was lost: the recording was set apart for the set, and the set for its model."""
+    folder = batch(units=3)
+    one = read_result(folder / "unit1_0")
     origin, none = one.origin, np.full(len(one.names), np.nan)
     recording = SetRecording(
         "bag", origin.serial, origin.power_on, origin.start_ns, 21.0, 60.0, one.data["samples"], 1.0, none, none, none
     )
-    # The only result of the usual model belongs to a set of another one.
     joint = replace(one, model=(*one.model, "accel_quadratic"), of_set=SetSummary((recording,), (), (), none, ()))
-    write_result(tmp_path / "batch" / "unit1" / "result.json", joint)
-    with pytest.raises(DataError, match="no result is left to compare; unit0_0: its recording is one of the set"):
-        gather([folder])
+    write_result(folder / "joint" / "result.json", joint)
+    found = gather([folder])
+    assert {entry.name for entry in found.entries} == {"unit0_0", "unit1_0", "unit2_0"}
+    (apart,) = found.apart
+    assert apart.startswith("joint: other model (+ accel_quadratic)")
 
 
 @pytest.mark.parametrize("alone", [[], {"labels": 3}, {"labels": ["a"], "display_units": ["ppm"], "estimates": ["x"]}])

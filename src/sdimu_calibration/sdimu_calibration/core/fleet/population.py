@@ -16,6 +16,7 @@ import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.fleet.reml import RandomEffect, random_effect, spread_and_mean
+from sdimu_calibration.core.plain_text import counted
 from sdimu_calibration.core.probability import student_tail
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.wording import Option, Work
@@ -139,7 +140,7 @@ def population(fleet: Measured) -> Population:
     units = fleet.units
     if len(units) < FEWEST_UNITS:
         raise DataError(
-            f"fleet: {len(fleet.serials)} results of {len(units)} units fit together; a population needs "
+            f"fleet: what fits together is of {counted(len(units), 'unit')}; a population needs "
             f"{FEWEST_UNITS} units (state the unit of each recording: {Work.CALIBRATE} {Option.SERIAL})"
         )
     found = tuple(_coefficient(fleet, k) for k in range(len(fleet.names)))

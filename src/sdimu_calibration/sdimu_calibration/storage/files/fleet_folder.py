@@ -70,15 +70,14 @@ def gather(folders: Sequence[Path], one_model: bool = True) -> Gathered:
         raise DataError(f"{folders[0]}: no result.json that can be used below it{why}; make some: sdimu calibrate BAG")
     kinds = [entry.kind if one_model else (entry.kind[0], (), entry.kind[2]) for entry in usable]
     main = max(dict.fromkeys(kinds), key=kinds.count)
+    fitting = [entry for entry in usable if not _misfit(entry, main, one_model)]
     entries: list[Entry] = []
     for entry in sorted(usable, key=lambda e: (e.result.origin.start_ns, e.name)):
-        reason = _misfit(entry, main, one_model) or _repeats(entry, entries) or _part_of_set(entry, usable)
+        reason = _misfit(entry, main, one_model) or _repeats(entry, entries) or _part_of_set(entry, fitting)
         if reason:
             apart.append(f"{entry.name}: {reason}")
         else:
             entries.append(entry)
-    if not entries:
-        raise DataError(f"{folders[0]}: no result is left to compare; {apart[0]}")
     return Gathered(tuple(entries), tuple(apart), _given(usable, main))
 
 
@@ -87,9 +86,10 @@ def _given(usable: Sequence[Entry], main: tuple[str, tuple[str, ...], str]) -> t
     diagnosed = [e for e in usable if e.diagnosis is not None and (e.kind[0], e.kind[2]) == (main[0], main[2])]
     models = [_model_before(e) for e in diagnosed]
     usual = max(dict.fromkeys(models), key=models.count, default=())
+    alike = [entry for entry, model in zip(diagnosed, models, strict=True) if model == usual]
     out: list[Entry] = []
-    for entry, model in zip(diagnosed, models, strict=True):
-        if model == usual and not _repeats(entry, out) and not _part_of_set(entry, diagnosed):
+    for entry in alike:
+        if not _repeats(entry, out) and not _part_of_set(entry, alike):
             out.append(entry)
     return tuple(out)
 
