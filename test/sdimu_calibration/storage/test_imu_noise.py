@@ -21,10 +21,10 @@ def test_a_run_by_hand_without_noise_of_its_own_has_no_noise_of_a_table_gyro(est
 
 def test_a_result_brings_the_noise_with_which_it_was_calibrated():
     mine = load_imu("mems_consumer").noise_alone
-    result = SimpleNamespace(estimator="filter", imu_noise=mine)
+    result = SimpleNamespace(estimator="filter", imu_noise=mine, noise=())
     for nobody in (None, ""):
         specification, whose = noise_for(result, nobody)
-        assert specification is mine
+        assert specification == mine
         assert "mems_consumer" in whose
     assert noise_for(result, "dtg")[0] == load_imu("dtg")
 

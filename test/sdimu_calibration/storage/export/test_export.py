@@ -24,6 +24,7 @@ from sdimu_calibration.core.units import from_si, to_si
 from sdimu_calibration.storage.export import FORMS, export
 from sdimu_calibration.storage.export.shared import number
 from sdimu_calibration.storage.files.config import load_imu
+from sdimu_calibration.storage.files.result_file import noise_for
 
 BASELINE = (
     "gyro_bias",
@@ -239,6 +240,22 @@ def test_an_imu_file_has_the_noise_that_the_calibration_learned_and_the_rest_of_
     assert base.accel_bias_instability > 0.0 == found.accel_bias_instability
     assert sum("Gauss-Markov noise of 100 s" in line for line in done.missing) == 1
     assert "# NOT IN THIS FILE: gyro Gauss-Markov noise of 100 s" in (tmp_path / "mine.yaml").read_text()
+
+
+@pytest.mark.parametrize("form", ["kalibr", "openvins", "kalibr-noise", "gtsam"])
+def test_a_random_walk_that_was_learned_is_in_every_form_that_states_one(tmp_path: Path, form: str) -> None:
+    """It was 0, "not known", and what else was learned was left out without a word."""
+    made = replace(result(*BASELINE), noise=LEARNED, imu_noise=load_imu("dtg").noise_alone)
+    done = export(form, tmp_path / "noise", made, noise_for(made, None)[0], rate_hz=50.0)
+    if form in NOISE_READERS:
+        accel, gyro = NOISE_READERS[form](tmp_path / "noise")[2:4]
+    else:
+        imu = yaml.safe_load((tmp_path / "noise").read_text().replace("%YAML:1.0\n", ""))["imu0"]
+        accel, gyro = imu["accelerometer_random_walk"], imu["gyroscope_random_walk"]
+    assert (from_si(accel, "ug/sqrt(h)"), gyro) == (pytest.approx(30.0), 0.0)
+    lost = [line for line in done.missing if "random walks alone" in line]
+    assert [line.partition(" (")[0] for line in lost] == [term.words.partition(" (")[0] for term in LEARNED[:2]]
+    assert all(f"NOT IN THIS FILE: {line}" in (tmp_path / "noise").read_text() for line in lost)
 
 
 def test_an_imu_file_keeps_the_stated_noise_of_a_triad_of_which_nothing_was_learned(tmp_path: Path) -> None:

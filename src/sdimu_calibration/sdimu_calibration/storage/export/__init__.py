@@ -45,11 +45,13 @@ class Form(NamedTuple):
 
 FORMS = {
     "matrices": Form("compensation.txt", matrices.texts, cannot_hold),
-    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, cannot_hold, True),
-    "kalibr-noise": Form("kalibr-imu.yaml", noise_file.kalibr_texts, noise_file.cannot_hold, True),
-    "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, cannot_hold, True),
+    "kalibr": Form("imu-kalibr.yaml", kalibr.texts, cannot_hold, True, forgets=noise_file.no_walk),
+    "kalibr-noise": Form(
+        "kalibr-imu.yaml", noise_file.kalibr_texts, noise_file.cannot_hold, True, forgets=noise_file.no_walk
+    ),
+    "openvins": Form("kalibr_imu_chain.yaml", openvins.texts, cannot_hold, True, forgets=noise_file.no_walk),
     "imu": Form("imu.yaml", own_imu.texts, own_imu.cannot_hold, True, "sdimu-imu", not_stated),
-    "gtsam": Form("imu_metadata.txt", noise_file.gtsam_texts, noise_file.cannot_hold, True),
+    "gtsam": Form("imu_metadata.txt", noise_file.gtsam_texts, noise_file.cannot_hold, True, forgets=noise_file.no_walk),
     "imu_tk": Form("imu_tk.calib", imu_tk.texts, imu_tk.cannot_hold),
     "c-header": Form("sdimu_compensation.h", c_header.texts, c_header.cannot_hold),
     "yaml": Form("compensation.yaml", yaml_file.texts, yaml_file.cannot_hold),

@@ -33,7 +33,8 @@ def texts(source: Source) -> dict[str, str]:
     lines = comments(source, "#")
     lines += [
         "# Kalibr's names: accelerometers M = M_a; gyroscopes M C_gyro_i = M_g, A C_gyro_i = G. Its files have no",
-        "# biases: 'bias' is added. Random walks are those of the IMU file; 0 is not known: set it before use.",
+        "# biases: 'bias' is added. Random walks: of --imu, else learned, else of the IMU file; 0 is not known: set it",
+        "# before use.",
         "imu0:",
         "  model: scale-misalignment",
         *(f"  {line}" for line in noise_lines(source)),

@@ -13,8 +13,10 @@ and the same for the gyros: the first is the density of the white noise, the sec
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from sdimu_calibration.core.compensation import LinearModel
+from sdimu_calibration.core.noise_term import RANDOM_WALK, NoiseTerm
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.storage.export.kalibr import noise_lines
 from sdimu_calibration.storage.export.shared import Source, number
@@ -28,7 +30,7 @@ _EQUATIONS = (
     "Noise of the IMU; its samples go through sdimu compensate first.",
     "white noise: sigma of a mean over T seconds = density / sqrt(T);",
     "random walk: sigma of the bias's change in T seconds = random walk * sqrt(T).",
-    "Random walks are those of the IMU file; 0 is not known: set it before use.",
+    "Random walks: of --imu, else learned, else of the IMU file; 0 is not known: set it before use.",
 )
 
 
@@ -57,6 +59,11 @@ def cannot_hold(linear: LinearModel) -> list[str]:
     """Say what is left out: everything but the noise."""
     del linear
     return ["every coefficient (the program gets samples that went through sdimu compensate)"]
+
+
+def no_walk(terms: Sequence[NoiseTerm]) -> list[str]:
+    """Say which noise that a calibration learned is no random walk, and has no place in a form of densities."""
+    return [f"{term.words} (the form states random walks alone)" for term in terms if term.kind != RANDOM_WALK]
 
 
 def _comments(source: Source) -> list[str]:

@@ -27,7 +27,7 @@ def texts(source: Source) -> dict[str, str]:
         "%YAML:1.0",
         *comments(source, "#"),
         "# OpenVINS' names: Ta = M_a, Tw R_IMUtoGYRO = M_g, Tg = G. Its files have no biases: they are added. Random",
-        "# walks are those of the IMU file; 0 is not known: set it before use.",
+        "# walks: of --imu, else learned, else of the IMU file; 0 is not known: set it before use.",
         "imu0:",
         *block("  T_i_b", np.eye(4)),
         *(f"  {line}" for line in noise_lines(source)),

@@ -34,6 +34,7 @@ from sdimu_calibration.core.results import (
 )
 from sdimu_calibration.core.site_reference import Reference
 from sdimu_calibration.core.specification import ImuSpecification
+from sdimu_calibration.core.stated_noise import with_learned
 from sdimu_calibration.core.units import parse_unit
 from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.storage.files.config import config_folder, load_imu
@@ -368,7 +369,9 @@ def noise_for(result: Calibration, imu: str | None) -> tuple[ImuSpecification, s
     if imu:
         return load_imu(imu), f"'{imu}' (--imu)"
     if result.imu_noise is not None:
-        return result.imu_noise, f"'{result.imu_noise.name}', with which the result was calibrated"
+        known = with_learned(result.imu_noise, result.noise)
+        learned = "" if known == result.imu_noise else ", with what was learned"
+        return known, f"'{result.imu_noise.name}', with which the result was calibrated{learned}"
     if result.origin.imu in {path.stem for path in (config_folder() / "imu").glob("*.yaml")}:
         return load_imu(result.origin.imu), f"'{result.origin.imu}', the IMU that the result names"
     name = "mems_by_hand" if result.estimator == "handheld" else "dtg"
