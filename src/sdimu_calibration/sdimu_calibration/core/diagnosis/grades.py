@@ -130,7 +130,7 @@ def _likely(one: Graded) -> str:
 
 
 def _open(one: Graded) -> str:
-    """Name what it may be, each with its probability; the likeliest with its size, and how likely none of them is it."""
+    """Name what it may be, each with its probability; the likeliest with its size, and how likely it is none."""
     sizes = {one.coefficient: f" ({one.size})"}
     shown = one.may_be[:LISTED]
     percent = percents_of(one.may_be)
