@@ -117,7 +117,9 @@ def test_a_right_model_is_left_alone():
     told = summarise(_diagnosis(SEEDS[int(np.argmin(finds))]))
     assert told.diagnosis.verdict == "consistent"
     assert told.found == ()
-    np.testing.assert_array_equal(told.diagnosis.before.values, told.diagnosis.after.values)
+    before, after = told.diagnosis.before, told.diagnosis.after
+    # What stays open has little weight, and moves no coefficient by as much as its sigma.
+    assert (np.abs(after.values - before.values) <= 0.5 * np.sqrt(np.diag(after.covariance))).all()
 
 
 def test_signatures_are_what_the_equations_do_when_the_effect_acts():

@@ -130,7 +130,7 @@ def test_a_fit_answers_every_question(case):
 def test_models_that_stay_open_move_and_widen_what_a_fit_states(case):
     fit, name = fit_of(case), "accel_scale_x"
     evidence, k = fit.evidence(), fit.names.index(name)
-    count, place = len(evidence.weight), evidence.names.index(name)
+    count, place = sum(one in fit.names for one in evidence.names), evidence.names.index(name)
     sigma = np.sqrt(fit.covariance[k, k])
     doubt, moved = np.zeros((count, count)), np.zeros(count)
     doubt[place, place], moved[place] = (3.0 * sigma) ** 2, 2.0 * sigma
