@@ -32,11 +32,12 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Goals, str]:
     folder = tmp_path_factory.mktemp("adaptive")
     goals = folder / "coarse.yaml"
     goals.write_text(GOALS, encoding="utf-8")
-    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--seed", 7, "--no-diagnose", "--out", folder / "run")
+    process = sdimu("run", "--adaptive", goals, "--rate", 20, "--seed", 7, "--no-diagnose", "--out", folder / "run")
     try:
         out, err = process.communicate(timeout=DEADLINE_S)
     finally:
         process.kill()
+    assert process.returncode in {0, 3}, err
     result = read_result(folder / "run" / "result.json")
     assert process.returncode == (3 if result.misfits or result.not_to_be_trusted else 0), err
     assert "were not reached" not in err
@@ -77,7 +78,7 @@ def test_a_test_that_ends_without_its_limits_says_so_with_its_exit_status(tmp_pa
     goals = tmp_path / "hopeless.yaml"
     limits = "limits: {gyro_bias: 1e-6 deg/h}"
     goals.write_text(f"format: sdimu-goal/1\nname: hopeless\nminutes: 1\n{limits}\n", encoding="utf-8")
-    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--no-diagnose", "--out", tmp_path / "run")
+    process = sdimu("run", "--adaptive", goals, "--rate", 20, "--no-diagnose", "--out", tmp_path / "run")
     try:
         _, err = process.communicate(timeout=DEADLINE_S)
     finally:
@@ -94,7 +95,7 @@ def test_what_was_found_for_sure_is_in_the_result_whose_limits_hold(tmp_path):
     goals.write_text(GOALS, encoding="utf-8")
     effect = ("--effect", "accel_quadratic_z=400 ug/g^2")
     out = tmp_path / "run"
-    process = sdimu("run", "--adaptive", goals, "--rate", 50, "--seed", 8, *effect, "--out", out)
+    process = sdimu("run", "--adaptive", goals, "--rate", 20, "--seed", 8, *effect, "--out", out)
     try:
         told, err = process.communicate(timeout=DEADLINE_S)
     finally:
