@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.posterior.family import BIAS_DRIFT
 from sdimu_calibration.core.posterior.told import FamilyShare, MemberShare, NoiseShare, Probabilities
@@ -16,6 +16,10 @@ from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.effect_words import title_of
 from sdimu_calibration.report.markup import quiet, section
 from sdimu_calibration.report.table import with_sigma
+
+if TYPE_CHECKING:
+    # A report of one recording needs none of the rooms of a set.
+    from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
 
 _LEAST = 0.05
 """Probability (1) from which a family or a noise has a line of its own: less is one of many."""
