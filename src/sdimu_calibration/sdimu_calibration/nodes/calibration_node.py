@@ -39,6 +39,7 @@ from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.data.axes_and_units import Stated
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
+from sdimu_calibration.core.live_model import first_sigmas
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -104,13 +105,13 @@ class CalibrationNode:
         self._journal = Journal(self._out / JOURNAL, options, lasting=checkpoint)
         if aside := self._journal.set_aside:
             self.node.get_logger().warning(f"{self._out / JOURNAL}: {self._journal.why_aside}; kept as {aside}")
+        self._first: dict[str, float] = {}
         self._feed = Feed(self._make, self._journal)
         resumed = self._feed.resumed_ns
         self._ended: float | None = None
         self._result: Calibration | None = None
         self._concluded = 0.0
         self._departed: float | None = None
-        self._first: dict[str, float] = {}
         self._last = ""
 
         ticker = Ticker(self.node)
@@ -157,6 +158,8 @@ class CalibrationNode:
         self.node.get_logger().info(f"goes on after {count} s from {self._out / JOURNAL}")
 
     def _make(self) -> LiveCalibration:
+        # What was there before an effect is added stays measured against the start of the test.
+        self._first = {**first_sigmas(self._options, self._models[0]), **self._first}
         return LiveCalibration(self._options, *self._models)
 
     def _check_added(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -239,7 +242,6 @@ class CalibrationNode:
     def _tell(self, e: EpochEstimate) -> None:
         """Log one line at the end of each stop: how far the sigmas have fallen, and the innovations."""
         sigmas = dict(zip(e.names, np.sqrt(np.diag(e.covariance)).tolist(), strict=True))
-        self._first = self._first or sigmas
         if e.used:
             units = dict(zip(e.names, e.display_units, strict=True))
             effects = [effect if isinstance(effect, str) else effect.key for effect in self._models[0].effects]
@@ -274,7 +276,6 @@ class CalibrationNode:
     def _take_model(self, seconds: float = math.inf) -> None:
         """Work for so long (s) on the filter with a model that was changed; go on with it once it is there."""
         if self._feed.catch_up(seconds):
-            self._first = {}
             self.node.get_logger().info("the filter on the way has the new model")
 
     def _take_end(self) -> None:
@@ -329,7 +330,7 @@ class CalibrationNode:
         self._stream.restart()
         self._diagnosing.restart()
         self._ended = self._departed = self._result = None
-        self._first, self._last = {}, ""
+        self._last = ""
         response.success = True
         return response
 
