@@ -138,6 +138,10 @@ def test_a_candidate_that_is_clicked_is_added_and_the_answer_is_shown(page, reco
     page.wait_for_function("document.querySelector('#answer').textContent.includes('asked')")
     asked: list[str] = []
     record.carry_out(lambda effects: asked.extend(effects) or "")
+    page.wait_for_function("document.querySelector('#answer').textContent.includes('goes through all samples')")
+    now = Now(2)
+    now.sigmas[EFFECT] = 1e-5
+    record.take(now, True, 3.0)
     page.wait_for_function("document.querySelector('#answer').textContent.includes('is in the model')")
     assert asked == [EFFECT]
 

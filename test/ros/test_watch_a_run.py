@@ -58,6 +58,8 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, ap
     for stop in (1, 2):
         one, other = (re.sub(r"\d+ of", "of", told(text, stop)[0]) for text in (done, seen))
         assert one == other
+    assert f"the test adds {EFFECT}: its filter goes through all samples so far again" in seen
+    assert seen.count(f"{EFFECT} is in the model\n") == 1
     assert read_result(tmp_path / "run").names[-1] == EFFECT
 
 

@@ -31,9 +31,9 @@ class Now:
     diagnosis: SeenDiagnosis = field(default_factory=SeenDiagnosis)
 
 
-def told(terminal: bool, *shown: tuple[Now, bool]) -> str:
+def told(terminal: bool, *shown: tuple[Now, bool], awaited: tuple[str, ...] = ()) -> str:
     console = Console(file=StringIO(), force_terminal=terminal, width=200, color_system=None)
-    with Watch(console, TEST) as watch:
+    with Watch(console, TEST, awaited) as watch:
         for now, streaming in shown:
             watch.show(now, streaming, 3.0)
     return console.file.getvalue()
@@ -114,3 +114,14 @@ def test_a_pipe_gets_one_line_a_diagnosis():
         "asymmetry +27.4 sigma, 41 ppm, quadratic +12.1 sigma, 3 ppm (noise reaches 3.82); "
         "error with one stop left out: as given 2.42, + asymmetry 0.98",
     ]
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_line_says_when_the_filter_has_what_was_added(terminal):
+    more = replace(Now(), sigmas={**Now().sigmas, "gyro_scale_asymmetry_y": SCALE})
+    line = "gyro_scale_asymmetry_y is in the model\n"
+    assert line not in told(terminal, (Now(), True), (Now(), True)).replace("\r", "")
+    assert told(terminal, (Now(), True), (more, True), (more, True)).replace("\r", "").count(line) == 1
+    # Not of one that had it before somebody watched, unless it is the one who adds it.
+    assert line not in told(terminal, (more, True))
+    assert line in told(terminal, (more, True), awaited=("gyro_scale_asymmetry_y",))

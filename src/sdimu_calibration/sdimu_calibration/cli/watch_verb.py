@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -72,10 +73,9 @@ def watch(
     start_ns = None if test is None else test.start_ns
     record = LiveRecord(outline) if test is None else LiveRecord(outline, test.folder, test.words)
     with LivePage(page, record, console) as shown, closing(Monitor(start_ns, first)) as monitor:
-        if add and (why := monitor.add(add)):
-            raise DataError(f"--add {' '.join(add)}: {why}")
+        awaited = _ask(console, monitor, add) if add else ()
         shown.begin()
-        watching = _Watching(console, monitor, outline, record)
+        watching = _Watching(console, monitor, outline, awaited, record)
         is_over = _follow(watching, None if test is None else used, seconds)
         if not monitor.progress.heard:
             raise DataError(
@@ -86,6 +86,19 @@ def watch(
     if is_over:
         results = f"; results in {record.folder}" if record.folder else ""
         console.print(f"the test has ended{results}", highlight=False, soft_wrap=True)
+
+
+def _ask(console: Console, monitor: Monitor, add: Sequence[str]) -> tuple[str, ...]:
+    """Let the running test add effects; the coefficients that it will estimate for it."""
+    from sdimu_calibration.core.effects import selection
+    from sdimu_calibration.report.live_seen import adding_words
+    from sdimu_calibration.storage.files.effect_file import find_effects
+
+    if why := monitor.add(add):
+        raise DataError(f"--add {' '.join(add)}: {why}")
+    console.print(adding_words(add), highlight=False, markup=False, soft_wrap=True)
+    effects = (selection.resolve(effect) for text in add for effect in find_effects(text))
+    return tuple(parameter.name for effect in effects for parameter in effect.parameters)
 
 
 def _waited(domain: int | None, console: Console, seconds: float) -> bool:
@@ -232,6 +245,8 @@ class _Watching:
     console: Console
     monitor: Monitor
     outline: Outline
+    awaited: Collection[str]
+    """Coefficients of what it adds."""
     record: LiveRecord
 
 
@@ -248,7 +263,7 @@ def _follow(watching: _Watching, domain: int | None, seconds: float) -> bool:
 
     begun = time.monotonic()
     pace, monitor = Pace(), watching.monitor
-    with Watch(watching.console, watching.outline) as shown:
+    with Watch(watching.console, watching.outline, watching.awaited) as shown:
         while is_read() and (not seconds or time.monotonic() - begun < seconds):
             now = monitor.listen(0.2)
             wall_s = pace.wall(now.table_s, time.monotonic() - begun)

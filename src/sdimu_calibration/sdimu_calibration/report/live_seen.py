@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from sdimu_calibration.core.plain_text import listing
 from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 
 
@@ -82,3 +83,13 @@ def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
     rest = max(0.0, test.duration_s - seen.table_s) / pace
     words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
     return f"{test.at_most}{words} left at {pace:.3g} times real time"
+
+
+def adding_words(effects: Sequence[str]) -> str:
+    """Say what a test does that was asked for effects more, until `in_the_model`."""
+    return f"the test adds {listing(effects)}: its filter goes through all samples so far again"
+
+
+def in_the_model(effects: Sequence[str]) -> str:
+    """Say that a filter estimates what was added."""
+    return f"{listing(effects)} {'is' if len(effects) == 1 else 'are'} in the model"

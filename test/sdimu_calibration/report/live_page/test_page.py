@@ -171,6 +171,10 @@ def test_the_button_adds_what_was_chosen_and_the_answer_is_one_line():
     assert "asked" in page.ask()["answer"]["children"]
     record.carry_out(lambda effects: asked.extend(effects) or "")
     assert asked == ["gyro_scale_asymmetry_y"]
+    assert page.ask()["answer"]["children"].startswith("the test adds gyro_scale_asymmetry_y")
+    now = grown()
+    now.sigmas["gyro_scale_asymmetry_y"] = 1e-5
+    record.take(now, True, 3.0)
     assert page.ask()["answer"]["children"].startswith("gyro_scale_asymmetry_y is in the model")
 
 

@@ -95,7 +95,13 @@ def test_what_a_page_asks_for_reaches_the_test_once_and_its_answer_comes_back():
     record.carry_out(lambda effects: asked.append(effects) or "")
     record.carry_out(lambda effects: asked.append(effects) or "")
     assert asked == [["gyro_bias_step_y(t0=300 s)"], ["accel_quadratic_x"]]
-    assert record.view().answer.startswith("accel_quadratic_x is in the model")
+    record.take(Now(diagnosis=MISFIT), True, 3.0)
+    assert record.view().answer.startswith("the test adds accel_quadratic_x: its filter goes through all samples")
+    now = Now(diagnosis=MISFIT)
+    now.sigmas["accel_quadratic_x"] = 1e-5
+    record.take(now, True, 3.0)
+    # The first one was still awaited as the second was asked for.
+    assert record.view().answer.startswith("gyro_bias_step_y(t0=300 s) and accel_quadratic_x are in the model")
     before = record.view().versions[ANSWER]
     record.ask("accel_quadratic_y")
     record.carry_out(lambda _: "the calibration node\ndoes not answer")
