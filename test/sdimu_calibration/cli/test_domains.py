@@ -63,6 +63,7 @@ def test_a_run_tells_those_that_watch_it_where_it_is_and_what_it_makes(tmp_path,
         monkeypatch.delenv("ROS_DOMAIN_ID")  # the shell of one that watches
         assert running_tests() == (replace(ABOUT, domain=31),)
         assert watched(None) == replace(ABOUT, domain=31)
+        assert not outlined(replace(ABOUT, diagnosed=False), None, ())[0].diagnosed
         assert watched(31) == replace(ABOUT, domain=31)
         assert ABOUT.words == "/out/run \N{MIDDLE DOT} plan kim18 \N{MIDDLE DOT} IMU dtg \N{MIDDLE DOT} daejeon"
         assert watched(32) is None  # nodes without a run say nothing of their test

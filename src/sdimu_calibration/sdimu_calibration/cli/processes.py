@@ -101,6 +101,8 @@ class RunningTest:
     course: str = ""
     """What the table drives, such as ``plan kim18``."""
     site: str = ""
+    diagnosed: bool = True
+    """At the end of each stop."""
 
     @property
     def words(self) -> str:

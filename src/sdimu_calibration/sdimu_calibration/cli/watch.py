@@ -102,7 +102,7 @@ class Watch:
         for f in self._falling(seen):
             sigmas.add_row(f.effect, f"{short(f.sigma)} {f.unit}", _gauge(f), f"{short(100.0 * f.share)} %")
         lamp = Text(light(seen.nis, seen.verdict), style="green" if fine else "bold yellow")
-        return Group(head, lamp, sigmas, picture(seen.diagnosis))
+        return Group(head, lamp, sigmas, picture(seen.diagnosis, self._test.not_yet))
 
     def _falling(self, seen: Progress) -> list[Falling]:
         return falling(seen.first, seen.sigmas, self._test.units, self._test.effects)
@@ -129,13 +129,13 @@ _MOST_STOPS = 16
 _MOST_RANKED = 8
 
 
-def picture(seen: SeenDiagnosis) -> RenderableType:
-    """Return heat map, ranking and ladder, as far as there is a diagnosis."""
+def picture(seen: SeenDiagnosis, not_yet: str) -> RenderableType:
+    """Return heat map, ranking and ladder; `not_yet` before there is a diagnosis."""
     from rich.console import Group
     from rich.text import Text
 
     if seen.stop < 0:
-        return Text("no diagnosis yet", style="dim")
+        return Text(not_yet, style="dim")
     style = "dim" if not seen.ladder else "green" if seen.verdict == Verdict.CONSISTENT else "bold yellow"
     head = Text(f"diagnosis of stop {seen.stop}: {seen.sentence}", style=style)
     return Group(head, _heat_map(seen), _tables(seen)) if seen.ladder else head

@@ -235,7 +235,7 @@ def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     J = frame_jacobian(list(units), chosen.body_frame)
     first = dict(zip(units, np.sqrt((J**2) @ sizes**2).tolist(), strict=True))
     later = {q.name: size for e in map(get, names()) if (size := prior_size(e, imu)) for q in e.parameters}
-    return Outline(test.duration_s, test.stops, keys, units), {**later, **first}
+    return Outline(test.duration_s, test.stops, keys, units, test.diagnosed), {**later, **first}
 
 
 @dataclass(frozen=True)

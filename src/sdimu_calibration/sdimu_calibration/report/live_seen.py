@@ -56,6 +56,15 @@ class Outline:
     effects: Sequence[str]
     units: Mapping[str, str]
     """Customary unit by coefficient."""
+    diagnosed: bool = True
+    """At the end of each stop."""
+
+    @property
+    def not_yet(self) -> str:
+        """What stands in the place of a diagnosis before there is one."""
+        if self.diagnosed:
+            return "No diagnosis so far; one is made at the end of each stop."
+        return "No diagnosis while this test runs: it was begun with --no-diagnose."
 
     @property
     def at_most(self) -> str:

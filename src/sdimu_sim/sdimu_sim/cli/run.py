@@ -144,8 +144,8 @@ def _about(options: dict[str, dict[str, Any]], test: LiveTest, duration: float, 
 
     stops = 0 if test.adaptive else len(load_plan(test.followed).dwell_s)
     start_ns = int(options["table"]["start_ns"])
-    place = {"course": test.course, "site": options["calibration"]["site"]}
-    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns, **place)
+    more = {"course": test.course, "site": options["calibration"]["site"], "diagnosed": test.diagnose}
+    return RunningTest(str(out.resolve()), duration, stops, test.model, test.imu, start_ns, **more)
 
 
 def _parameters(test: LiveTest, world: World, out: Path) -> dict[str, dict[str, Any]]:

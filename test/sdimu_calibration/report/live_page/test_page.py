@@ -163,6 +163,13 @@ def test_a_page_without_a_message_says_that_it_waits():
     assert "No diagnosis so far" in words(shown["candidates"]["children"])
 
 
+def test_a_page_of_a_test_without_diagnosis_says_so():
+    """It promised one at the end of each stop."""
+    shown = Page(LiveRecord(replace(TEST, diagnosed=False))).ask()
+    for text in (words(shown["candidates"]["children"]), shown["verdict"]["children"]):
+        assert text == "No diagnosis while this test runs: it was begun with --no-diagnose."
+
+
 def test_the_button_adds_what_was_chosen_and_the_answer_is_one_line():
     record, asked = record_of(grown()), []
     page = Page(record)

@@ -70,10 +70,10 @@ def _diagnosis(now: LiveView, look: Any) -> tuple[Any, ...]:
     heat = figures.heat_map(seen) if seen.stops else figures.nothing("no diagnosis yet")
     fell = figures.errors(now.errors) if now.errors else figures.nothing("no diagnosis yet")
     return (
-        *parts.verdict(seen),
+        *parts.verdict(now),
         figures.finished(heat, look),
         figures.finished(fell, look),
-        parts.candidates(seen),
+        parts.candidates(now),
         parts.options(seen),
     )
 

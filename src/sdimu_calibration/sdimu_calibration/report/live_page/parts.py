@@ -29,7 +29,6 @@ _TONES = {
     Verdict.DATA_FAULT: ("bad", "\N{HEAVY BALLOT X}"),
 }
 _DOUBTFUL = ("doubtful", "\N{WARNING SIGN}")
-NOT_YET = "No diagnosis so far; one is made at the end of each stop."
 
 
 def place(head: Head) -> Any:
@@ -56,23 +55,25 @@ def end_class(end: End | None) -> str:
     return "no-end" if end is None else f"ended {'good' if end.good else 'bad'}"
 
 
-def verdict(seen: SeenDiagnosis) -> tuple[str, str]:
+def verdict(view: LiveView) -> tuple[str, str]:
     """Return the last diagnosis in one line, and its class."""
+    seen = view.diagnosis
     if seen.stop < 0:
-        return NOT_YET, "verdict neutral"
+        return view.not_yet, "verdict neutral"
     tone, mark = _TONES.get(Verdict(seen.verdict), _DOUBTFUL)
     return f"{mark} Up to stop {seen.stop}: {signs(seen.sentence)}", f"verdict {tone}"
 
 
-def candidates(seen: SeenDiagnosis) -> list[Any]:
+def candidates(view: LiveView) -> list[Any]:
     """List what would explain the misfit: before the end by its score, then by its probability.
 
     Before the end a candidate whose score noise reaches is not listed: it explains nothing.
     """
+    seen = view.diagnosis
     if seen.families or not math.isnan(seen.nothing):
         return _odds(seen)
     if not seen.ranking:
-        return [html.P(NOT_YET, className="quiet")]
+        return [html.P(view.not_yet, className="quiet")]
     if not seen.standing:
         words = f"Nothing stands out: {seen.reaches}, and the score of no candidate is larger."
         return [html.P(words, className="quiet")]

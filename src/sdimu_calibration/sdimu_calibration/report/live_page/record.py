@@ -70,6 +70,8 @@ class _Kept:
     """Stop that a diagnosis is of, and the error of each model."""
     choices: tuple[SeenChoice, ...] = ()
     answer: str = ""
+    not_yet: str = ""
+    """What stands in the place of a diagnosis before there is one."""
     joined_s: float = 0.0
     """Time of the test (s) from which it was watched."""
 
@@ -101,7 +103,7 @@ class LiveRecord:
         self._test = test
         self._run = uuid4().hex
         self._lock = threading.Lock()
-        self._kept, self._curves = _Kept(), Curves()
+        self._kept, self._curves = _Kept(not_yet=test.not_yet), Curves()
         self._versions = dict.fromkeys(PARTS, 0)
         self._asked: SimpleQueue[str] = SimpleQueue()
         self._awaited: list[str] = []
