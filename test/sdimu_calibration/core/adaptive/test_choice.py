@@ -141,6 +141,18 @@ def test_an_open_class_is_told_apart_by_a_turn_about_its_own_axis_once_the_limit
     assert after[0, 0] > before[0, 0]
 
 
+def test_a_stop_that_adds_the_last_hundredth_of_a_nat_says_to_what():
+    """It was told as a stop that brings nothing."""
+    fit = perfect_fit(BOTH_SENSES, PAIR[:1])
+    wide = Goals("wide", dict.fromkeys(GOALS.limits, 1000.0), 30.0)
+    known = with_open(fit, wide, PAIR)
+    nearly = replace(known, open=replace(known.open, needed=np.array([0.01])))
+    choice = choose(nearly, wide, SHORT, 30.0, lambda *steps: len(steps) == 1)
+    assert isinstance(choice, Choice)
+    assert 0.0 < choice.told <= 0.01
+    assert choice.reason == f"adds the rest that tells {PAIR[0]} from {PAIR[1]}"
+
+
 def test_a_turn_that_shows_nothing_is_chosen_where_it_leads_to_one_that_tells_a_class_apart():
     # At the end x stands upright, and a slow turn about it changes the azimuth alone; level, it shows as a tilt.
     pair = ("gyro_scale_asymmetry_x", "gyro_scale_quadratic_x")

@@ -214,6 +214,8 @@ def _reason(known: Knowledge, best: Move, now: Worth) -> str:
                 f"tells {known.open.found} from {known.open.alike[nearest]} (expected evidence "
                 f"{lacked[nearest]:+.1f} nat, the log of the odds)"
             )
+        elif lacked.sum() > 0.0 and not nat.max() > 0.0:
+            told.append(f"adds the rest that tells {known.open.found} from {known.open.alike[int(np.argmax(lacked))]}")
     if nat.max() > 0.0:
         i = int(np.argmax(nat))
         old, new = _times(now.ratio[0, i], best.worth.ratio[best.row, i])
