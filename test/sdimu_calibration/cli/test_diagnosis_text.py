@@ -13,6 +13,7 @@ from sdimu_calibration.cli.diagnosis_text import (
     CANDIDATE_HEADINGS,
     candidate_rows,
     cost_lines,
+    print_out_of_sight,
     print_summary,
     smallest,
     step_lines,
@@ -26,6 +27,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.held_out import HeldOut
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report import data, sections
 from sdimu_calibration.report.cost import coefficients_off, wrong_without
 
 
@@ -92,3 +94,18 @@ def test_what_is_taken_as_absent_is_told_with_what_it_would_do():
     assert taken_for_granted([one, replace(one, coefficient="accel_scale_x", sigmas=96.0)]) == (
         "if reference_gravity were 68.1 ug, accel_scale_z would be wrong by 154 sigma"
     )
+
+
+def test_terminal_and_page_say_what_they_count_as_unseen_and_at_which_size(summary, capsys):
+    """9 of 612 candidates at any size here, and 22 of 57 effects at the usual size there, read as one thing."""
+    hidden = [one for one in summary.reached if not one.testable]
+    print_out_of_sight(plain(), summary)
+    told = " ".join(capsys.readouterr().out.split())
+    never = "could not have been seen even at 30 times their usual size"
+    assert (
+        f"{len(hidden)} of {len(summary.reached)} candidates (each axis and time of an effect counts) {never}" in told
+    )
+    page = sections.smallest(data.scored(summary.diagnosis), summary.assumed, summary.untestable)
+    families = len({one.family for one in hidden})
+    assert "have an axis on which they could not have been seen at their usual size" in page
+    assert f", {families} of these one on which they {never}." in page

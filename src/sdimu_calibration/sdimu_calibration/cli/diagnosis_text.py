@@ -12,6 +12,7 @@ from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
 from sdimu_calibration.core.diagnosis.ladder import figures_in_words
 from sdimu_calibration.core.diagnosis.verdict import POSSIBLE, beyond, error_falls
 from sdimu_calibration.core.error_figures import held_out, noise_learned
+from sdimu_calibration.core.evidence.testable import UNSEEN
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital
@@ -212,7 +213,8 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
     """Print how many effects could not have been seen, and why."""
     hidden = [r for r in summary.reached if not r.testable]
     if hidden:
-        line(console, f"{len(hidden)} of {len(summary.reached)} candidates could not have been seen with this plan:")
+        count = f"{len(hidden)} of {len(summary.reached)} candidates (each axis and time of an effect counts)"
+        line(console, f"{count} {UNSEEN} with this plan:")
     for group in summary.untestable:
         names = ", ".join(group.labels[:3]) + (" ..." if len(group.labels) > 3 else "")
         line(console, f"  {group.reason}: {len(group.labels)} ({names})")

@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 from sdimu_calibration.core.estimation.fit_words import MISFIT
+from sdimu_calibration.core.evidence.testable import UNSEEN
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital, first_of
 from sdimu_calibration.core.results import Calibration
@@ -149,7 +150,7 @@ def _unseen(summary: DiagnosisSummary) -> str:
     hidden, most = [one for one in summary.reached if not one.testable], summary.untestable[0]
     names = first_of(most.labels, _WORST)
     return (
-        f"{len(hidden)} of {len(summary.reached)} candidates could not have been seen in this test, and spoil the "
+        f"{len(hidden)} of {len(summary.reached)} candidates {UNSEEN} in this test, and spoil the "
         f"coefficients if they are there: {names} ({most.reason})."
     )
 

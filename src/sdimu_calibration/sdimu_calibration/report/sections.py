@@ -17,7 +17,7 @@ from sdimu_calibration.core.diagnosis.ladder import Rung, figures_in_words
 from sdimu_calibration.core.diagnosis.step import Step
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
-from sdimu_calibration.core.evidence.testable import WORST_SENSOR
+from sdimu_calibration.core.evidence.testable import UNSEEN, WORST_SENSOR
 from sdimu_calibration.core.noise_term import NoiseTerm
 from sdimu_calibration.core.plain_text import capital
 from sdimu_calibration.core.probability import in_percent
@@ -412,10 +412,11 @@ def smallest(
     order = sorted(worst.values(), key=lambda e: (np.isfinite(e.smallest), -e.smallest / e.prior))
     why = {label: group.reason for group in untestable for label in group.labels}
     rows = [_seen(entry, why) for entry in order]
-    unseen = sum(row[-1] != "yes" for row in rows)
+    unseen, never = sum(row[-1] != "yes" for row in rows), sum(row[-1].startswith("no") for row in rows)
     return section(
         "What could have been seen",
-        f"<p>Of {len(rows)} effects, {unseen} could not have been seen on every axis at their usual size.</p>",
+        f"<p>Of {len(rows)} effects, {unseen} have an axis on which they could not have been seen at their usual size, "
+        f"{never} of these one on which they {UNSEEN}.</p>",
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         _taken_for_granted(assumed),
         quiet(

@@ -9,3 +9,5 @@ the data; what is known before them says which is likelier."""
 WORST_SENSOR = 30.0
 """Factor on the one-sigma size that physics gives an effect: no sensor is worse, so what does not show at that size is
 not seen."""
+UNSEEN = f"could not have been seen even at {WORST_SENSOR:.0f} times their usual size"
+"""What is said of effects that do not show at that size."""
