@@ -90,9 +90,11 @@ def test_coefficients_are_wrong_by_what_a_calibration_delivers(summary, more):
 
 def test_what_is_taken_as_absent_is_told_with_what_it_would_do():
     """ "No X (68 ug of it, Z is off by 154 sigma)" read as if X were there and Z were off."""
-    one = Assumed("accel_scale_z", "reference_gravity", "reference_gravity", to_si(68.1, "ug"), "m/s^2", "ug", 153.6)
+    one = Assumed(
+        "accel_scale_z", "reference_gravity", "reference_gravity", to_si(66.8, "mgal"), "m/s^2", "mgal", 153.6
+    )
     assert taken_for_granted([one, replace(one, coefficient="accel_scale_x", sigmas=96.0)]) == (
-        "if reference_gravity were 68.1 ug, accel_scale_z would be wrong by 154 sigma"
+        "if reference_gravity were 66.8 mgal, accel_scale_z would be wrong by 154 sigma"
     )
 
 

@@ -84,7 +84,7 @@ def _usually_off(reference: Reference) -> str:
     if reference.origin != "normal":
         return ""
     off = GRAVITY_SIGMAS[BY_FORMULA]
-    size = f"{from_si(off, 'mgal'):.0f} mgal or {from_si(off / reference.told, 'ppm'):.0f} ppm"
+    size = f"{from_si(off, 'mgal'):.0f} mgal, scale factors by {from_si(off / reference.told, 'ppm'):.0f} ppm"
     return f", off by {size} (root mean square over the Earth): state gravity_m_s2, or gravity_sigma: {BY_FORMULA}"
 
 

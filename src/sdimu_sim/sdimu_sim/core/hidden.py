@@ -194,7 +194,7 @@ LOST_AFTER_S = 3.0
 """Data of a turn are lost from this long after its start where the key does not say at what time."""
 _LEVER_ARM = {f"lever_arm_{axis}": i for i, axis in enumerate(_XYZ)}
 _SITE = {
-    "reference_gravity": ("gravity", "ug"),
+    "reference_gravity": ("gravity", "mgal"),
     "reference_latitude": ("latitude", "arcsec"),
     "reference_deflection_east": ("east", "arcsec"),
 }

@@ -14,6 +14,7 @@ from sdimu_calibration.core.data.latitude_check import EarthRate, contradictions
 from sdimu_calibration.core.diagnosis.diagnose import climb
 from sdimu_calibration.core.diagnosis.found import found_effects
 from sdimu_calibration.core.effects.references import stated_references, told_of
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import fit_about, solve
@@ -118,9 +119,11 @@ def test_a_site_at_its_word_says_what_is_relative_to_it():
     line = relative_line(result.references)
     assert "accel_scale_x, accel_scale_y, accel_scale_z to gravity 9.798288 m/s^2 (WGS-84" in line
     # The root of 1795 mgal^2, and over 979829 mgal.
-    assert ", off by 42 mgal or 43 ppm (root mean square over the Earth)" in line
+    assert ", off by 42 mgal, scale factors by 43 ppm (root mean square over the Earth)" in line
     assert line.endswith(": state gravity_m_s2, or gravity_sigma: formula")
     assert "\n" not in line
+    # What a diagnosis tells of gravity is read beside it, and beside the site's file.
+    assert gravity.display_unit == resolve("reference_gravity").parameters[0].display_unit == "mgal"
 
 
 def test_a_stated_gravity_is_not_said_to_be_that_of_a_formula():

@@ -42,7 +42,7 @@ GRAVITY = register(
         name="reference_gravity",
         title="gravity of the site",
         equation="df = C_bn (0, 0, dg)",
-        parameters=(Parameter("reference_gravity", "m/s^2", "ug"),),
+        parameters=(Parameter("reference_gravity", "m/s^2", "mgal"),),
         terms=tuple(Term(channel, 0) for channel in ACCEL),
         regressors=lambda m: _along(m, 2),
         prior=dict.fromkeys(("navigation", "tactical", "mems"), 1e-3),
@@ -50,7 +50,7 @@ GRAVITY = register(
         scope="setup",
         needs_table=True,
         never_seen="a wrong gravity is a common scale factor of the accelerometers whatever the plan: survey it",
-        typical="WGS-84 normal gravity: 10-50 ug; a survey: below 1 ug",
+        typical="WGS-84 normal gravity: 10-50 mgal; a survey: below 1 mgal",
         description="Cannot be told from a common scale factor of the accelerometers, whatever the plan: quote it as a "
         "floor of the scale factor.",
         confused_with=("accel_scale",),
