@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.report.coefficients import grouped_table
 from sdimu_calibration.report.figures import rotations, sigma_history, spread
 from sdimu_calibration.report.groups import groups, short_name
 from sdimu_calibration.report.page import Contents, page
@@ -162,3 +164,17 @@ def test_a_page_without_diagnosis_says_where_the_verdict_is(calibration):
 )
 def test_a_size_goes_as_far_as_two_digits_of_its_sigma(value, sigma, written):
     assert with_sigma(value, sigma, "ppm") == written
+
+
+def test_a_negative_coefficient_has_the_minus_sign_that_the_text_above_it_has(calibration):
+    page = grouped_table(rows(calibration))
+    assert "<td>\N{MINUS SIGN}0.500</td>" in page
+    assert "<td>-" not in page
+
+
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [(1027.4, "1027"), (999.7, "1000"), (3600.0, "3600"), (-1234.0, "-1234"), (43.21, "43.2"), (2e7, "2e+07")],
+)
+def test_a_number_for_people_has_no_power_of_ten_for_a_thousand(value, written):
+    assert three(value) == written

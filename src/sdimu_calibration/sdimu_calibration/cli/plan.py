@@ -17,6 +17,7 @@ from sdimu_calibration.cli.progress import bar
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effect_key import read_quantity
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.shell_words import joined
 
@@ -286,7 +287,7 @@ def _table(
     for effect in limits if known is None else shown["found"]:
         unit = units[effect]
         numbers = [sizes.get(effect) for sizes in shown.values()] + ([limits.get(effect)] if limits else [])
-        rows.append([effect, *("" if v is None else f"{from_si(v, unit):.3g}" for v in numbers), unit])
+        rows.append([effect, *("" if v is None else three(from_si(v, unit)) for v in numbers), unit])
     lengths = {"known": "", start.name: f"{start.duration_s / 60.0:.1f}", "found": f"{found.minutes:.1f}"}
     rows.append(["minutes", *(lengths[name] for name in shown), *([""] if limits else []), "min"])
     return ["effect", *shown, *(["limit"] if limits else []), "unit"], rows

@@ -9,6 +9,9 @@ LONGEST_LINE = 500
 _TAIL = 160
 """Number of characters kept of the end of a line that is too long: what to do stands there."""
 
+_LONG = 1e6
+"""Number (1) from which people read a power of ten: its digits are no longer counted at a glance."""
+
 
 def printable(text: str) -> str:
     """Write every character that a terminal would obey, not show, as ``ascii`` does."""
@@ -37,6 +40,11 @@ def counted(number: int, one: str, many: str = "") -> str:
     `one`, `many`: what stands behind one, and behind any other number; `one` with an s by default.
     """
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def three(value: float) -> str:
+    """Write a number with three digits, a larger one whole: people read 1027, not 1.03e+03."""
+    return f"{value:.0f}" if 999.5 <= abs(value) < _LONG else f"{value:.3g}"
 
 
 def first_of(names: Sequence[str], most: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.effects.effect import ACCEL, BASELINE, GYRO, REFERENCES, Effect
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.formula import mathml
 
@@ -64,7 +65,7 @@ def facts(effect: Effect) -> list[str]:
 def sizes(effect: Effect) -> str:
     """Prior of an effect in its display unit, by grade."""
     unit = effect.parameters[0].display_unit
-    return ", ".join(f"{grade} {from_si(value, unit):.3g} {unit}" for grade, value in effect.prior.items())
+    return ", ".join(f"{grade} {three(from_si(value, unit))} {unit}" for grade, value in effect.prior.items())
 
 
 def page(typeset: bool = False) -> str:

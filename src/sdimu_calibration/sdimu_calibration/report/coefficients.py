@@ -19,7 +19,7 @@ from sdimu_calibration.report.drawing import AFTER, Figure, lay_out, literal
 from sdimu_calibration.report.effect_words import effect_of_key, tip, title_of
 from sdimu_calibration.report.figures import sigma_history
 from sdimu_calibration.report.groups import free
-from sdimu_calibration.report.markup import Draw, folded, quiet, section
+from sdimu_calibration.report.markup import Draw, folded, quiet, section, signs
 from sdimu_calibration.report.sections import separation
 from sdimu_calibration.report.statistics_section import influence_part
 from sdimu_calibration.report.table import Row
@@ -116,7 +116,7 @@ def grouped_table(entries: Sequence[table.Row]) -> str:
 
 
 def _line(row: table.Row, columns: list[str], kinds: Sequence[str]) -> str:
-    texts = zip(table.cells(row, columns), kinds, strict=True)
+    texts = zip(map(signs, table.cells(row, columns)), kinds, strict=True)
     return f'<tr id="c-{row.name}">' + "".join(f"<td{kind}>{escape(text)}</td>" for text, kind in texts) + "</tr>"
 
 

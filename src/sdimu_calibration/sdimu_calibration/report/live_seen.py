@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from sdimu_calibration.core.plain_text import listing
+from sdimu_calibration.core.plain_text import listing, three
 from sdimu_calibration.report.live_text import Rows, SeenChoice, SeenDiagnosis
 
 
@@ -91,7 +91,7 @@ def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
     pace = seen.table_s / wall_s
     rest = max(0.0, test.duration_s - seen.table_s) / pace
     words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
-    return f"{test.at_most}{words} left at {pace:.3g} times real time"
+    return f"{test.at_most}{words} left at {three(pace)} times real time"
 
 
 def adding_words(effects: Sequence[str]) -> str:

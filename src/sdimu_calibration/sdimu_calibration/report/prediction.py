@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.planning.predict import Prediction
 from sdimu_calibration.core.results import Calibration, History
 from sdimu_calibration.core.units import from_si
@@ -152,4 +153,4 @@ def _unobservable(prediction: Prediction) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else ""
+    return three(value) if np.isfinite(value) else ""

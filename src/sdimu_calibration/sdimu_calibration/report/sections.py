@@ -19,7 +19,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.evidence.consistency import Consistency
 from sdimu_calibration.core.evidence.testable import UNSEEN, WORST_SENSOR
 from sdimu_calibration.core.noise_term import NoiseTerm
-from sdimu_calibration.core.plain_text import capital
+from sdimu_calibration.core.plain_text import capital, three
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
@@ -440,7 +440,7 @@ def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
     if not assumed:
         return ""
     rows = [
-        [a.coefficient, a.label, f"{from_si(a.size, a.display_unit):.3g}", a.display_unit, f"{a.sigmas:.1f} sigma"]
+        [a.coefficient, a.label, three(from_si(a.size, a.display_unit)), a.display_unit, f"{a.sigmas:.1f} sigma"]
         for a in assumed
     ]
     told = (
@@ -453,9 +453,9 @@ def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
 
 def _seen(entry: data.Scored, why: Mapping[str, str]) -> list[str]:
     """Return a row of `_SMALLEST`. `why`: reasons by label, those that the terminal and diagnosis.json give."""
-    size = f"{entry.smallest:.3g}"
+    size = three(entry.smallest)
     answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
     if not np.isfinite(entry.smallest) or entry.smallest > WORST_SENSOR * entry.prior:
         size, answer = "", ": ".join(word for word in ("no", why.get(entry.label, "")) if word)
-    usual = f"{entry.prior:.3g}" if np.isfinite(entry.prior) else ""
+    usual = three(entry.prior) if np.isfinite(entry.prior) else ""
     return [entry.label, size, entry.unit, usual, f"{100 * entry.retention:.1f} %", answer]

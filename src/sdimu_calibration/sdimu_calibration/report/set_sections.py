@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.effects.effect import CHANNELS
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.probability import in_percent
 from sdimu_calibration.core.results import Calibration, SetRecording, SetSummary, of_recordings
 from sdimu_calibration.core.units import from_si
@@ -88,7 +89,7 @@ def _turn_on(calibration: Calibration, of_set: SetSummary) -> list[str]:
     rows = [
         [
             t.effect,
-            *(f"{from_si(v, t.display_unit):.3g}" for v in (t.sigma, t.low, t.high)),
+            *(three(from_si(v, t.display_unit)) for v in (t.sigma, t.low, t.high)),
             t.display_unit,
             f"{t.power_ons:.0f}",
         ]

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from sdimu_calibration.core.effect_key import effect_of
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.groups import free
@@ -112,12 +113,12 @@ def cells(row: Row, columns: list[str]) -> list[str]:
         "estimate": f"{row.value:.{decimals}f}",
         "sigma": sigma,
         "unit": row.unit,
-        "prior": "" if row.prior is None else f"{row.prior:.3g}",
+        "prior": "" if row.prior is None else three(row.prior),
         "sigma / prior": f"{100.0 * row.sigma / row.prior:.2g} %" if row.prior and row.sigma > 0 else "",
         "truth": _number(row.truth, decimals),
         "error": _number(row.error, decimals),
         "error/sigma": _number(row.error_sigmas, 2),
-        "published sigma": "" if row.reference is None else f"{row.reference:.3g}",
+        "published sigma": "" if row.reference is None else three(row.reference),
     }
     return [texts[column] for column in columns]
 

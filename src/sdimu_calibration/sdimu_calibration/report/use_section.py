@@ -9,6 +9,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.estimation.free_inertial import Drift, FreeInertialRun
 from sdimu_calibration.core.estimation.holdout import WANTED_S
+from sdimu_calibration.core.plain_text import three
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report import cost
 from sdimu_calibration.report.drawing import AFTER, BEFORE, MUTED, Figure, lay_out
@@ -84,7 +85,7 @@ def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
         f"{stretch.place}: {span}",
         f"{drift.distance[-1]:.4g}",
         f"{_rate(drift):.2g}",
-        f"{promised:.3g}" if np.isfinite(promised) else "",
+        three(promised) if np.isfinite(promised) else "",
         f"{drift.speed[-1]:.2g}",
         f"{from_si(float(drift.heading[-1]), 'arcmin'):+.2g}",
     ]

@@ -139,3 +139,11 @@ def test_a_limit_is_kept_only_by_the_whole_interval(low, high, limit, verdict):
 
 def test_what_was_not_measured_does_not_pass():
     assert Line("gyro bias", "rad/s", "deg/h").against(1.0).verdict == NOT_MEASURED
+
+
+def test_one_coefficient_is_not_told_as_the_largest_of_one():
+    sigmas = 0.1 * SIZES
+    sigmas[4:] = 0.0  # known
+    lines = sheet_of([result(SIZES, sigmas)])
+    assert lines["gyro scale-factor error"].method == "the one coefficient"
+    assert lines["gyro bias"].method == "largest of 3 coefficients"

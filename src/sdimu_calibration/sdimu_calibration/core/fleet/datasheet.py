@@ -188,6 +188,7 @@ def _of_effects(term: str, effects: Sequence[Effect], samples: Sequence[Sample])
     z = normal_limit(tail) if within is None else student_limit(tail, within.dof)
     size = np.abs(value)
     worst = int(np.argmax(size))
+    largest = f"largest of {tests} coefficients" if tests > 1 else "the one coefficient"
     once = "" if within is None else ", mean of the recordings of a unit"
     return replace(
         empty,
@@ -199,7 +200,7 @@ def _of_effects(term: str, effects: Sequence[Effect], samples: Sequence[Sample])
         recordings=rows.recordings,
         units=len(set(rows.unit)),
         condition=conditions(samples),
-        method=f"largest of {tests} coefficients{once}",
+        method=f"{largest}{once}",
     )
 
 

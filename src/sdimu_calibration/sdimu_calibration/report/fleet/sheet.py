@@ -146,6 +146,7 @@ def _limit(line: Line) -> str:
 
 _JUDGED = ("limit", "verdict")
 """Columns of a sheet that is held against limits."""
+_NUMBERS = frozenset({"value", "95 % interval", "rms", "n", "limit"})
 
 
 def _table(lines: Sequence[Line]) -> str:
@@ -160,7 +161,9 @@ def _table(lines: Sequence[Line]) -> str:
             body.append(f'<tr class="group"><td colspan="{len(heads)}">{triad}s</td></tr>')
         told = [line if line.condition != same else replace(line, condition="") for line in own]
         body += [_line(line, triad, judged) for line in told]
-    head = "".join(f'<th class="text">{escape(word)}</th>' for word in heads)
+    # As the cells below: numbers stand flush right, words flush left.
+    kinds = ["" if word in _NUMBERS else ' class="text"' for word in heads]
+    head = "".join(f"<th{kind}>{escape(word)}</th>" for word, kind in zip(heads, kinds, strict=True))
     text = (
         "Value: the largest over axes and units, with its 95 % interval (all axes together); rms: over axes and units; "
         "n: recordings."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from sdimu_calibration.core import plain_text
 from sdimu_calibration.core.fleet.common import CommonEffect
 from sdimu_calibration.core.fleet.population import Coefficient
 from sdimu_calibration.core.fleet.study import Study
@@ -116,9 +117,7 @@ def sentences(done: Study, units: Mapping[str, str]) -> list[str]:
 
 def three(value: float) -> str:
     """Write a size with three digits; one that is nothing beside any unit as 0."""
-    if abs(value) < 1e-12:
-        return _NOTHING_VARIES
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    return _NOTHING_VARIES if abs(value) < 1e-12 else plain_text.three(value)
 
 
 def probability(p: float) -> str:
