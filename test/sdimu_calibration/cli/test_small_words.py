@@ -138,8 +138,14 @@ def test_typical_sizes_are_of_the_sensor_that_is_shown(sdimu, name, other, effec
 
 
 def test_a_verb_that_is_none_names_those_that_look_like_it(monkeypatch, capsys):
-    for typed, words in (("calibrat", "did you mean calibrate"), ("xyzzy", "sdimu --help lists them")):
-        monkeypatch.setattr("sys.argv", ["sdimu", typed])
+    for typed, words in (
+        ("calibrat", "did you mean calibrate"),
+        ("xyzzy", "sdimu --help lists them"),
+        ("bag inf", "did you mean info"),
+        ("bag xyzzy", "no verb 'xyzzy'; choose info, cut or recover"),
+        ("set xyzzy", "no verb 'xyzzy'; choose init"),
+    ):
+        monkeypatch.setattr("sys.argv", ["sdimu", *typed.split()])
         with pytest.raises(SystemExit) as ending:
             cli.main()
         assert ending.value.code == 2

@@ -87,7 +87,7 @@ def test_stated_units_are_taken_and_wrong_ones_refused(tmp_path):
     assert np.allclose(r.f_ib_b, simulated().f_ib_b, rtol=1e-14, atol=0)
     with pytest.raises(DataError, match="expected a unit such as m/s"):
         open_recording(path, Source(accel_unit="deg"))
-    with pytest.raises(DataError, match="unknown unit"):
+    with pytest.raises(DataError, match=r"unknown unit .* such as rad/s, deg/s or deg/h\)"):
         open_recording(path, Source(gyro_unit="turns"))
     with pytest.raises(DataError, match="expected 1 or -1"):
         open_recording(path, Source(accel_sign=2))

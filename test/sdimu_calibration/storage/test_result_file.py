@@ -225,3 +225,9 @@ def test_a_result_has_both_ends_of_its_temperatures_or_none(tmp_path, end):
     with pytest.raises(DataError, match=r"origin: temperature_low_degc and temperature_high_degc: a number") as error:
         read_result(_damaged(tmp_path, ("origin", end), 20.0))
     assert "\n" not in str(error.value)
+
+
+def test_a_result_that_is_not_there_is_refused_with_what_makes_one(tmp_path):
+    for place in (tmp_path / "nowhere", tmp_path):
+        with pytest.raises(DataError, match=r"no such file \(expected a result.json or its folder, as sdimu calibrate"):
+            read_result(place)

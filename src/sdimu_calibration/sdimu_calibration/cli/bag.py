@@ -11,12 +11,15 @@ import typer
 from sdimu_calibration.cli.console import answer, command, plain, say
 from sdimu_calibration.cli.opened import tell
 from sdimu_calibration.cli.options import BagArgument, JsonOption
+from sdimu_calibration.cli.verb_group import VerbGroup
 from sdimu_calibration.cli.wide_table import print_table
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.shell_words import joined
 
 app = typer.Typer(
-    help="Look into a recording, take a part of it, or mend one that was cut short.", no_args_is_help=True
+    cls=VerbGroup,
+    help="Look into a recording, take a part of it, or mend one that was cut short.",
+    no_args_is_help=True,
 )
 
 

@@ -11,7 +11,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -19,11 +18,11 @@ from types import FrameType
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 from typer.main import get_command
 
 import sdimu_calibration
 from sdimu_calibration.cli.closed_pipe import outliving_readers
+from sdimu_calibration.cli.verb_group import VerbGroup
 from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.units import UnitError
@@ -50,17 +49,13 @@ _VERBS = {
     for name in _PLACED
     if name not in _ELSEWHERE.split()
 }
-_LIKE = 0.6
-"""Share of letters (1) from which a verb looks like what was typed: one letter more, less or other."""
-_LONGEST_VERB = 60
-"""Number of characters of a verb that is none (1) that a message shows."""
 _WORDS = {"Path": "FILE", "int": "N", "float": "NUMBER"}
 """What stands in help for a type of Python; any other is a text."""
 _MORE = "More"
 """Where verbs of other packages stand that have no place above."""
 
 
-class Verbs(TyperGroup):
+class Verbs(VerbGroup):
     """The verbs of this package and of every package that adds some."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 (the signature is the base class')
@@ -73,14 +68,6 @@ class Verbs(TyperGroup):
         options = super().get_params(ctx)
         _speak_plainly(options)
         return options
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Find the verb; of one that is none, name those that look like it."""
-        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            near = get_close_matches(args[0], self.list_commands(ctx), n=3, cutoff=_LIKE)
-            hint = f"did you mean {', '.join(near)}?" if near else "sdimu --help lists them"
-            ctx.fail(f"no verb '{one_line(args[0], _LONGEST_VERB)}'; {hint}")
-        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb; what is wrong with its options is told in a few lines, however long a word is."""

@@ -8,9 +8,12 @@ from typing import Annotated
 import typer
 
 from sdimu_calibration.cli.console import plain
+from sdimu_calibration.cli.verb_group import VerbGroup
 from sdimu_calibration.shell_words import joined
 
-app = typer.Typer(help="Say which recordings are of one unit, for calibrate and diagnose --set.", no_args_is_help=True)
+app = typer.Typer(
+    cls=VerbGroup, help="Say which recordings are of one unit, for calibrate and diagnose --set.", no_args_is_help=True
+)
 
 
 @app.callback()

@@ -69,12 +69,14 @@ def _factor(option: str, unit: str | None, expected: str) -> float | None:
     try:
         parsed = parse_unit(match[2])
     except UnitError as error:
-        raise DataError(f"{option}: {error}") from error
+        raise DataError(f"{option}: {error} (expected a unit such as {_SUCH[expected]})") from error
     if parsed.dimension != parse_unit(expected).dimension:
-        raise DataError(f"{option} {unit}: expected a unit such as {expected}")
+        raise DataError(f"{option} {unit}: expected a unit such as {_SUCH[expected]}")
     return float(match[1] or 1.0) * parsed.factor
 
 
+_SUCH = {"m/s^2": "m/s^2, g, mg or ug", "deg/s": "rad/s, deg/s or deg/h"}
+"""Units that drivers send, by one of them."""
 _MULTIPLE = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)?\s*\*?\s*(.*)")
 """A unit, or a multiple of one such as ``2 deg/s``."""
 

@@ -255,6 +255,8 @@ def read_judged_result(path: Path) -> tuple[Calibration, tuple[str, ...]]:
 def _read(path: Path) -> tuple[Path, Calibration, str]:
     """Path of the file itself, what it holds, and its verdict."""
     path = Path(path) / "result.json" if Path(path).is_dir() else Path(path)
+    if not path.exists():
+        raise DataError(f"{path}: no such file (expected a result.json or its folder, as sdimu calibrate leaves it)")
     file = read_model(path, ResultFile)
     with complete(path, FORMAT):
         return path, _calibration(file), file.verdict
