@@ -127,7 +127,7 @@ def test_no_entry_of_the_legend_is_cut(browser, width):
         ends = page.locator("#sigmas .legendtext").evaluate_all(f"all => all.map({right})")
         starts = page.locator("#sigmas .legendtext").evaluate_all("all => all.map(e => e.getBoundingClientRect().left)")
         page.close()
-    assert len({round(start) for start in starts}) == 2
+    assert len({round(start) for start in starts}) >= 2
     assert max(ends) <= frame
 
 

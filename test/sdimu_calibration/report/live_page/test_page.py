@@ -85,8 +85,8 @@ def test_the_page_shows_where_the_test_is_what_it_knows_and_where_it_fails():
     assert "stop 1 of 3 dwell" in words(shown["place"]["children"])
     assert "100 times real time" in words(shown["place"]["children"])
     traces = {trace["name"]: trace for trace in shown["sigmas"]["figure"]["data"]}
-    assert traces["gyro scale 75 ppm"]["y"] == [0.5]
-    assert traces["gyro bias 0.01 deg/h"]["x"] == pytest.approx([290.0 / 60.0], abs=1e-3)
+    assert traces["gyro scale<br>75 ppm"]["y"] == [0.5]
+    assert traces["gyro bias<br>0.01 deg/h"]["x"] == pytest.approx([290.0 / 60.0], abs=1e-3)
     assert shown["sigmas"]["figure"]["layout"]["yaxis"]["type"] == "log"
     (map_,) = shown["nis"]["figure"]["data"]
     assert (map_["x"], map_["y"], map_["text"]) == (["0", "1"], ["position", "rate"], [["1.2", "1.2"], ["1.0", "1.0"]])
@@ -146,6 +146,16 @@ def test_the_theme_draws_everything_anew():
     light = page.ask()["sigmas"]["figure"]
     dark = page.ask({"scale": 1, "theme": "dark"})["sigmas"]["figure"]
     assert light["data"][0]["line"]["color"] != dark["data"][0]["line"]["color"]
+
+
+def test_lines_of_a_triad_differ_without_their_colour_and_the_legend_is_as_large_as_the_rest():
+    """The fifth had long dashes, which look like the dashes of the second, and words of 9 px named them."""
+    effects = ("gyro_bias", "gyro_scale", "gyro_misalignment", "gyro_mass_unbalance", "gyro_scale_asymmetry_y")
+    figure = figures.sigmas(Drawn((0.0, 60.0), dict.fromkeys(effects, (1.0, 0.5))), ())
+    lines = [(trace["line"]["dash"], trace["line"]["width"]) for trace in figure.data]
+    assert len(set(lines)) == len(effects)
+    assert not any("long" in dash for dash, _ in lines)
+    assert figure.layout["legend"]["font"]["size"] >= 12
 
 
 def test_a_page_of_an_earlier_test_gets_all_of_the_new_one():

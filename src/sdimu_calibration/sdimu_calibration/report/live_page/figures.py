@@ -31,16 +31,17 @@ _DIGITS = 4
 """Digits of what is drawn: finer than a screen, and short on the way to the page."""
 _FULL = 3.0
 """Powers of two of the NIS at which the colour is full: eight times too large."""
-_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+_DASHES = ("solid", "dash", "dot", "dashdot")
+_THICK = 2
+"""What a line is thicker (px) where its dash comes a second time: of long dashes nobody tells which is which."""
 _FONT = {"size": 12}
 _KEPT = "kept"
 """Name under which plotly keeps what a person zoomed, while a figure grows."""
 _MARGIN = {"l": 60, "r": 14, "t": 10, "b": 44}
-_LEGEND_FONT = 9.3
-"""Size of the words of a legend (px): with it the longest, of mass unbalances, is no wider than `_ENTRY`."""
-_LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": {"size": _LEGEND_FONT}}
-_ENTRY = 182
-"""Width of the words of an entry of the legend (px): two stand beside each other in a column of 470."""
+_LEGEND = {"orientation": "h", "x": 0, "y": -0.26, "yanchor": "top", "font": _FONT}
+_ENTRY = 150
+"""Width of the words of an entry of the legend (px), its size below its name: two stand beside each other in a column
+of 470."""
 _LABELS = 14
 """Number of stops that are written below a map: more would touch each other, or be turned on their side."""
 _SENSORS = ("gyro", "accel")
@@ -51,28 +52,32 @@ def sigmas(curves: Drawn, fallen: Sequence[Falling]) -> Figure:
 
     `curves`: share of the sigma at the start, by effect; `fallen`: the same now, with the sizes that the legend tells.
     """
-    now = {f.effect: f" {short(f.sigma)} {f.unit}" for f in fallen}
+    now = {f.effect: f"<br>{short(f.sigma)} {f.unit}" for f in fallen}
     minutes = [round(t / 60.0, _DIGITS) for t in curves.t]
     seen = dict.fromkeys(("gyro", "accel", "other"), 0)
     figure = Figure()
     for effect, values in curves.values.items():
         triad = next((word for word in _SENSORS if effect.startswith(word)), "other")
-        dash = _DASHES[seen[triad] % len(_DASHES)]
+        again, dash = divmod(seen[triad], len(_DASHES))
         seen[triad] += 1
         figure.add(
             "scatter",
             x=minutes,
             y=[None if v is None else float(f"{v:.{_DIGITS}g}") for v in values],
             mode="lines",
-            name=literal(title(effect) + now.get(effect, "")),
-            line={"color": MUTED if triad == "other" else f"@{triad}", "dash": dash, "width": 2},
+            name=literal(title(effect)) + now.get(effect, ""),
+            line={
+                "color": MUTED if triad == "other" else f"@{triad}",
+                "dash": _DASHES[dash],
+                "width": 2 + _THICK * again,
+            },
             hovertemplate=f"{literal(title(effect))}: %{{y:.2g}} of its sigma at the start<extra></extra>",
         )
     figure.x_axes(title="time of the test (min)", rangemode="tozero", standoff=4)
     figure.y_axes(title="sigma, share of the start", type="log", dtick="D2", tickformat=".2~%", standoff=4)
     legend = _LEGEND | {"x": -0.2, "y": -0.24, "entrywidth": _ENTRY}
-    more = {"showlegend": True, "legend": legend, "margin": _MARGIN | {"b": 124}, "uirevision": _KEPT}
-    return _laid_out(figure, HEIGHT + 60, **more)
+    more = {"showlegend": True, "legend": legend, "margin": _MARGIN | {"b": 184}, "uirevision": _KEPT}
+    return _laid_out(figure, HEIGHT + 120, **more)
 
 
 def nis_map(nis: Sequence[tuple[int, Mapping[str, float]]]) -> Figure:
@@ -191,7 +196,7 @@ def finished(figure: Figure, look: Any) -> Any:
         figure.layout["font"] = {"size": 12 * scale}
         figure.layout["margin"] = {side: value * scale for side, value in figure.layout["margin"].items()}
         legend = figure.layout["legend"]
-        figure.layout["legend"] = legend | {"font": {"size": _LEGEND_FONT * scale}}
+        figure.layout["legend"] = legend | {"font": {"size": 12 * scale}}
         if "entrywidth" in legend:
             figure.layout["legend"]["entrywidth"] = legend["entrywidth"] * scale
         for trace in figure.data:
