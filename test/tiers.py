@@ -244,7 +244,6 @@ LONG = {
         "test_what_two_recordings_leave_open_the_advised_third_one_closes",
     ),
     "test/sdimu_calibration/core/posterior/test_coefficients.py": (
-        "test_moments_over_all_models_are_those_of_the_mixture",
         "test_what_some_models_lack_is_the_part_of_its_probability_that_none_of_them_holds",
         "test_what_no_averaged_model_holds_counts_with_its_probability_beside_the_likeliest",
         "test_half_of_an_equation_that_no_physics_names_moves_no_coefficient",
