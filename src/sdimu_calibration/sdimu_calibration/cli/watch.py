@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sdimu_calibration.core.verdict import Verdict
-from sdimu_calibration.report.live_seen import Outline, Progress, in_the_model, left_words, place_words, time_words
+from sdimu_calibration.report.live_seen import (
+    Estimated,
+    Outline,
+    Progress,
+    in_the_model,
+    left_words,
+    place_words,
+    time_words,
+)
 from sdimu_calibration.report.live_text import SeenDiagnosis
 from sdimu_calibration.report.progress_text import Falling, falling, light, short, sigma_words
 
@@ -28,7 +36,7 @@ class Watch:
         from rich.live import Live
 
         self._console, self._test = console, test
-        self._awaited, self._estimated = frozenset(awaited), frozenset[str]()
+        self._estimated = Estimated(awaited)
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
         self._reported = -1
         self._diagnosed = SeenDiagnosis()
@@ -50,7 +58,8 @@ class Watch:
         `streaming`: samples still come; False while the whole test is calibrated once more. `wall_s`: time since the
         first sample.
         """
-        self._tell_added(frozenset(seen.sigmas))
+        if added := self._estimated.added(seen.sigmas):
+            self._print(in_the_model(added))
         if self._live:
             self._live.update(self.picture(seen, streaming, wall_s), refresh=True)
             return
@@ -62,12 +71,6 @@ class Watch:
             if seen.diagnosis.line != self._diagnosed.line:
                 self._print(seen.diagnosis.line)
             self._diagnosed = seen.diagnosis
-
-    def _tell_added(self, estimated: frozenset[str]) -> None:
-        """Say so once the filter estimates a coefficient more."""
-        if added := estimated - (self._estimated or estimated - self._awaited):
-            self._print(in_the_model(sorted(added)))
-        self._estimated = estimated
 
     def _print(self, line: str) -> None:
         self._console.print(line, soft_wrap=True, markup=False, highlight=False)

@@ -213,11 +213,8 @@ def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]
 
     Those of the catalogue are among them: an effect may be added at any time, by whoever watches.
     """
-    import numpy as np
-
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.core.effects.body_frame import frame_jacobian
-    from sdimu_calibration.core.effects.imu_model import prior_size
+    from sdimu_calibration.core.effects.imu_model import build, prior_sigmas, prior_size
     from sdimu_calibration.core.effects.registry import get, names
     from sdimu_calibration.report.live_seen import Outline
     from sdimu_calibration.storage.files.config import load_imu
@@ -230,10 +227,7 @@ def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     if test is None:
         return Outline(0.0, 0, keys, units), {}
     imu = load_imu(test.imu)
-    sizes = np.array([prior_size(effect, imu) or 0.0 for effect in effects for _ in effect.parameters])
-    # Published sigmas are those in the body frame, to which misalignments of both triads add up.
-    J = frame_jacobian(list(units), chosen.body_frame)
-    first = dict(zip(units, np.sqrt((J**2) @ sizes**2).tolist(), strict=True))
+    first = prior_sigmas(build(effects, imu), chosen.body_frame)
     later = {q.name: size for e in map(get, names()) if (size := prior_size(e, imu)) for q in e.parameters}
     return Outline(test.duration_s, test.stops, keys, units, test.diagnosed), {**later, **first}
 

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from sdimu_calibration.core.alignment.alignment import UNKNOWN_AZIMUTH, Alignment
 from sdimu_calibration.core.alignment.prepared import TestSetup, set_up
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.accelerometer_frame import squares_count
-from sdimu_calibration.core.effects.body_frame import frame_jacobian
 from sdimu_calibration.core.effects.earth_rate import EAST, with_any_direction
 from sdimu_calibration.core.effects.imu_model import ImuModel, with_references
 from sdimu_calibration.core.effects.references import stated_references
@@ -102,11 +99,3 @@ def live_model(options: OpeningOptions, model: Model) -> LiveModel:
         sensors = with_any_direction(sensors, options.site.latitude_rad)
     sensors, noise = with_noise_states(sensors, stated_noise(options.imu))
     return LiveModel(setup.sensors, replace(setup, sensors=sensors), noise, azimuth_free)
-
-
-def first_sigmas(options: OpeningOptions, model: Model) -> dict[str, float]:
-    """Sigmas (SI) before the first sample by coefficient, in the body frame of the model."""
-    sensors = live_model(options, model).asked
-    J = frame_jacobian(sensors.names, model.body_frame)
-    sigma = np.sqrt(np.diag(J @ sensors.prior_covariance @ J.T))
-    return dict(zip(sensors.names, sigma.tolist(), strict=True))

@@ -37,9 +37,10 @@ from std_srvs.srv import Trigger
 
 from sdimu_calibration.core.arrays import Ints
 from sdimu_calibration.core.data.axes_and_units import Stated
+from sdimu_calibration.core.effects.imu_model import prior_sigmas
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, EpochEstimate, LiveCalibration
-from sdimu_calibration.core.live_model import first_sigmas
+from sdimu_calibration.core.live_model import live_model
 from sdimu_calibration.core.plain_text import one_line
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
@@ -159,7 +160,8 @@ class CalibrationNode:
 
     def _make(self) -> LiveCalibration:
         # What was there before an effect is added stays measured against the start of the test.
-        self._first = {**first_sigmas(self._options, self._models[0]), **self._first}
+        model = self._models[0]
+        self._first = {**prior_sigmas(live_model(self._options, model).asked, model.body_frame), **self._first}
         return LiveCalibration(self._options, *self._models)
 
     def _check_added(self, parameters: list[Parameter]) -> SetParametersResult:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sdimu_calibration.core.plain_text import listing, three
@@ -92,6 +92,20 @@ def left_words(test: Outline, seen: Progress, wall_s: float) -> str:
     rest = max(0.0, test.duration_s - seen.table_s) / pace
     words = f"{rest:.0f} s" if rest < 100.0 else f"{rest / 60.0:.0f} min"
     return f"{test.at_most}{words} left at {three(pace)} times real time"
+
+
+class Estimated:
+    """Coefficients that a filter estimates. `awaited`: those that it was asked to add before anybody watched it."""
+
+    def __init__(self, awaited: Collection[str] = ()) -> None:
+        self._awaited, self._before = frozenset(awaited), frozenset[str]()
+
+    def added(self, now: Collection[str]) -> list[str]:
+        """Take what it estimates now; what came to that since the last time, in order of the names."""
+        known = frozenset(now)
+        new = known - (self._before or known - self._awaited)
+        self._before = known
+        return sorted(new)
 
 
 def adding_words(effects: Sequence[str]) -> str:

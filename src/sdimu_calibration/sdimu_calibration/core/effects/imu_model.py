@@ -11,6 +11,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects import selection
+from sdimu_calibration.core.effects.body_frame import frame_jacobian
 from sdimu_calibration.core.effects.effect import Effect, Parameter
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.effects.registry import get
@@ -275,6 +276,16 @@ def with_serving(
         correlation,
         sensors.serving + count,
     )
+
+
+def prior_sigmas(sensors: ImuModel, frame: str) -> dict[str, float]:
+    """Sigmas (SI) before the data by coefficient, as they are published: in a body frame.
+
+    Misalignments of both triads add up there.
+    """
+    J = frame_jacobian(sensors.names, frame)
+    sigma = np.sqrt(np.diag(J @ sensors.prior_covariance @ J.T))
+    return dict(zip(sensors.names, sigma.tolist(), strict=True))
 
 
 def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:

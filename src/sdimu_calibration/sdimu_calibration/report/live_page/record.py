@@ -16,6 +16,7 @@ from sdimu_calibration.core.data_error import DataError
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.report.live_page.curves import Curves, Drawn
 from sdimu_calibration.report.live_seen import (
+    Estimated,
     Outline,
     Progress,
     adding_words,
@@ -106,9 +107,7 @@ class LiveRecord:
         self._kept, self._curves = _Kept(not_yet=test.not_yet), Curves()
         self._versions = dict.fromkeys(PARTS, 0)
         self._asked: SimpleQueue[str] = SimpleQueue()
-        self._awaited: list[str] = []
-        self._estimated: frozenset[str] = frozenset()
-        """Coefficients that the filter estimated before it was given what is awaited."""
+        self._estimated = Estimated()
 
     def take(self, seen: Progress, streaming: bool, wall_s: float) -> None:
         """Take what is seen now.
@@ -131,16 +130,9 @@ class LiveRecord:
                 self._versions[DIAGNOSIS] += 1
             self._put(DIAGNOSIS, errors=tuple(sorted(seen.ladders.items())))
             self._put(CHOICES, choices=tuple(seen.choices))
-            self._take_in(frozenset(seen.sigmas))
-
-    def _take_in(self, estimated: frozenset[str]) -> None:
-        """Say so once the filter estimates what it was asked for; it goes through all samples before."""
-        if not self._awaited or not self._estimated:
-            self._estimated = estimated
-        if self._awaited and (estimated - self._estimated or estimated.issuperset(self._awaited)):
-            words = f"{in_the_model(self._awaited)}; the next diagnosis tells the error with and without it"
-            self._put(ANSWER, answer=words)
-            self._awaited = []
+            if added := self._estimated.added(seen.sigmas):
+                words = f"{in_the_model(added)}; the next diagnosis tells the error with and without it"
+                self._put(ANSWER, answer=words)
 
     def _where(self, seen: Progress, streaming: bool, wall_s: float) -> Head:
         test = self._test
@@ -199,7 +191,6 @@ class LiveRecord:
             why = add([effect])
             with self._lock:
                 self._put(ANSWER, answer=f"not added: {' '.join(why.split())}" if why else adding_words([effect]))
-                self._awaited += [] if why else [effect]
 
     def _next_asked(self) -> str | None:
         try:
