@@ -29,9 +29,7 @@ def test_no_sentence_has_to_be_read_twice(page, ends):
 
 
 def test_the_words_of_a_sentence_are_counted_to_its_end():
-    page = (
-        "One two\nthree: four.\n\n    code, no prose\n\n- *Five* [six](link.md).\n- *Seven.* Eight.\n"
-    )
+    page = "One two\nthree: four.\n\n    code, no prose\n\n- *Five* [six](link.md).\n- *Seven.* Eight.\n"
     assert [one.split() for one in sentences(page, ".:")] == [
         ["One", "two", "three:"],
         ["four."],
