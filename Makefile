@@ -82,8 +82,9 @@ colcon: export SDIMU_FIRST_DOMAIN = 227
 thorough-nodes: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and ros and not slow and not bench" test/ros test/book test/browser
 
+# Behind the nodes where both wait for a core: a node that gets none for long is taken for dead by the others.
 thorough-rest: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
+	nice -n 10 $(BIN)/python -m pytest -n 2 --dist loadfile -m "thorough and not ros and not slow and not bench"
 
 # What linear algebra decides, with other kernels of OpenBLAS (without AVX) than in `test` and `thorough`: no test stands on
 # the last digits of a library. The quick tests alone: the long ones hold with the kernels that users have.
@@ -94,7 +95,7 @@ NUMERICAL := $(addprefix test/sdimu_calibration/core/,alignment batch/test_chain
 
 other-blas: export OPENBLAS_CORETYPE = Nehalem
 other-blas: setup
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench" $(NUMERICAL)
+	nice -n 10 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough and not slow and not bench" $(NUMERICAL)
 
 # As a user of ROS would: build the three packages, test what was installed, and run a launch file of it outside the
 # repository (by the stand-in for ros2/launch, which is no wheel). Its test of 19 s runs the loops as Python: to compile

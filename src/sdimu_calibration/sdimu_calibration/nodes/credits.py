@@ -26,10 +26,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
+from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.nodes.stopping import asked_to_stop
 from sdimu_calibration.nodes.ticking import Ticker
 
@@ -45,7 +47,10 @@ QUIET_REPEATS = 20
 """Number of repeated credits without data after which what was sent and has not come counts as lost: 5 s. A lost packet
 is sent again at the writer's next heartbeat, up to 3 s later. Repeats are counted, not seconds: a node that was busy or
 had no processor has not looked for data meanwhile."""
-REFUSED_S = 20.0
+REFUSED_S = 120.0
+"""Longest wait (s) for a subscriber that takes nothing: a node that starts on a busy machine needed more than 20 s."""
+TELL_REFUSED_S = 5.0
+"""Time (s) after which such a wait is told: a killed subscriber is forgotten after 3 s."""
 NO_LIMIT = 2**63 - 1
 NS = 1_000_000_000
 
@@ -199,16 +204,32 @@ class Producer:
 
 
 def publish(publisher: Any, message: Any) -> None:
-    """Publish; while DDS refuses (5,000 samples unacknowledged) try again for `REFUSED_S`, then drop."""
-    deadline = time.monotonic() + REFUSED_S
+    """Publish; while DDS refuses (5,000 samples unacknowledged) try again for `REFUSED_S`.
+
+    Raises
+    ------
+    DataError
+        When a subscriber has taken nothing for so long: it hangs, or it was stopped.
+    """
+    begun = time.monotonic()
+    told = False
     while not asked_to_stop():
         try:
             publisher.publish(message)
-        except rclpy_implementation.RCLError:  # noqa: PERF203 (the loop is the retry)
-            if time.monotonic() > deadline:
-                raise
+        except rclpy_implementation.RCLError as error:  # noqa: PERF203 (the loop is the retry)
+            waited = time.monotonic() - begun
+            if waited > REFUSED_S:
+                raise DataError(f"{_refusal(publisher, waited)}; end the node that hangs, and start again") from error
+            if waited > TELL_REFUSED_S and not told:
+                get_logger("sdimu").warning(f"{_refusal(publisher, waited)}; waiting")
+                told = True
         else:
             return
+
+
+def _refusal(publisher: Any, waited_s: float) -> str:
+    count = publisher.get_subscription_count()
+    return f"{publisher.topic_name}: one of its {count} subscribers has taken nothing for {waited_s:.0f} s"
 
 
 class Consumer:
