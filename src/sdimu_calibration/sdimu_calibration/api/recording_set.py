@@ -24,7 +24,9 @@ from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration, SetSummary, of_recordings
 from sdimu_calibration.core.verdict import Verdict
+from sdimu_calibration.report.cost import in_use_entry
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.report_extras import of_navigations
 from sdimu_calibration.report.set_sections import stop_maps
 from sdimu_calibration.storage.bags.file_room import results_folder
 from sdimu_calibration.storage.files.advice_words import sentence
@@ -193,7 +195,8 @@ class JointDiagnosis(Diagnosed):
         folder = results_folder(folder)
         title = f"Diagnosis of {of_recordings(self.result).counted}"
         with written_together(folder) as part:
-            write_set_diagnosis(part / "diagnosis.json", self.core)
+            in_use = in_use_entry(of_navigations(self.core.ladder))
+            write_set_diagnosis(part / "diagnosis.json", self.core, in_use)
             write_result(part / "result.json", self.result, self.core.verdict)
             write_report(part / "report.html", self.result, title=title, of_set=self.core)
         return folder

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -158,8 +159,9 @@ def calibrate_together(asked: SetRequest) -> None:
 
 def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     """Find what the model of a set misses; leaves diagnosis.json, result.json and report.html."""
-    from sdimu_calibration.core.error_figures import held_out
+    from sdimu_calibration.report.cost import in_use_entry
     from sdimu_calibration.report.page import write_report
+    from sdimu_calibration.report.report_extras import of_navigations
     from sdimu_calibration.storage.files.diagnosis_file import write_set_diagnosis
     from sdimu_calibration.storage.files.result_file import write_result
 
@@ -170,7 +172,7 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
     folder = _folder(asked, "diagnosis")
     about = to_repeat(asked, folder)
     with written_together(folder) as part:
-        write_set_diagnosis(part / "diagnosis.json", found)
+        write_set_diagnosis(part / "diagnosis.json", found, in_use_entry(of_navigations(found.ladder)))
         write_result(part / "result.json", after, found.verdict)
         write_report(
             part / "report.html",
@@ -182,14 +184,26 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
         )
     printed(folder / "report.html")
     say(console, f"{found.verdict}: {found.sentence}")
-    if found.error_without is not None:
-        fell = " -> ".join(dict.fromkeys(f"{error:.3f}" for error in (found.error_without, held_out(found.after))))
-        say(console, f"held-out error, a recording left out at a time, in one noise: {fell}")
+    for text in _costs(found):
+        say(console, text)
     _show(console, after)
     print_advice(console, found.advice, about)
     say(console, f"results in {folder}")
     answer(folder / "diagnosis.json", asked.request.as_json)
     leave(after, (found.verdict, found.sentence))
+
+
+def _costs(found: SetDiagnosis) -> list[str]:
+    """Say how far the error falls, model by model: metres without aid, then recordings that are left out."""
+    from sdimu_calibration.report.cost import in_use
+    from sdimu_calibration.report.report_extras import of_navigations
+
+    use, errors = in_use(of_navigations(found.ladder)), found.ladder.errors
+    lines = [] if use is None else [use.sentence]
+    told = [f"{error:.3f} ({name})" for name, error in errors if not isnan(error)]
+    if told:
+        lines.append(f"held-out error, a recording left out at a time, in one noise: {' -> '.join(told)}")
+    return lines
 
 
 def to_repeat(asked: SetRequest, folder: Path) -> Asked:

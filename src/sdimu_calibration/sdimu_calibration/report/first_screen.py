@@ -19,6 +19,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary
 from sdimu_calibration.core.error_figures import held_out, held_out_judged, is_handheld, nis, nis_judged, noise_learned
 from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 from sdimu_calibration.core.estimation.fit_words import MISFIT
+from sdimu_calibration.core.estimation.free_inertial import FOUND
 from sdimu_calibration.core.evidence.testable import UNSEEN
 from sdimu_calibration.core.note import without_advice
 from sdimu_calibration.core.plain_text import capital, first_of
@@ -38,7 +39,7 @@ from sdimu_calibration.report.cost import (
 from sdimu_calibration.report.effect_words import tip
 from sdimu_calibration.report.glossary import explained
 from sdimu_calibration.report.markup import grid, prose, quiet, signs
-from sdimu_calibration.report.report_extras import FOUND, ReportExtras
+from sdimu_calibration.report.report_extras import ReportExtras, of_navigations
 
 if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
     from sdimu_calibration.core.joint.set_diagnosis import SetDiagnosis
@@ -159,8 +160,8 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
     """Say the error in noise that was learned; of a model that lacks nothing metres and the held-out error."""
     d, out = summary.diagnosis, []
     rungs = error_ladder(d)
-    if len(rungs) < 2 and (use := in_use(more)) is not None:
-        out.append((use.figures.replace(" -> ", _ARROW), escape(use.words)))
+    if len(rungs) < 2:
+        out += _metres(more)
     if noise_learned(d.after):
         out.append(_in_noise(held_out_judged(d.after)))
     if len(rungs) < 2 and np.isfinite(rungs[0][1]):
@@ -168,6 +169,12 @@ def _costs(summary: DiagnosisSummary, more: ReportExtras | None) -> tuple[tuple[
         means = _IN_WHITE if noise_learned(d.after) else "1 is right"
         out.append((f"{rungs[0][1]:.2f}", f"sigma: held-out error, at {where} that the fit has not seen; {means}"))
     return tuple(out)
+
+
+def _metres(more: ReportExtras | None) -> list[tuple[str, str]]:
+    """Say how far a navigation without aid drifts; nothing where there is none."""
+    use = in_use(more)
+    return [] if use is None else [(use.figures.replace(" -> ", _ARROW), escape(use.words))]
 
 
 _OFF = ("coefficient", "value", "wrong by", "unit", "in sigmas")
@@ -232,13 +239,14 @@ def _stands_for_an_effect(calibration: Calibration) -> bool:
 
 def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     """Say what was found in a set of recordings; `spell` makes whole commands of its advice."""
-    after = held_out(found.after)
-    before = after if found.error_without is None else found.error_without
+    more, rungs = of_navigations(found.ladder), found.ladder.errors
     off = coefficients_off(found.before, found.after) if found.findings else ()
     costs = []
-    values = [f"{value:.2f}" for value in dict.fromkeys((before, after)) if np.isfinite(value)]
-    if values:
-        costs.append((_ARROW.join(values), "sigma: held-out error, recordings left out; 1 is right"))
+    if len(rungs) < 2:
+        costs += _metres(more)
+        error = held_out(found.after)
+        if np.isfinite(error):
+            costs.append((f"{error:.2f}", "sigma: held-out error, recordings left out; 1 is right"))
     holds = ", which hold what was found" if found.findings else ""
     advice: tuple[Advice | str, ...] = found.advice or (f"Use the coefficients of this page{holds}.",)
     told = tuple(advice_html(one, spell) for one in advice)
@@ -246,7 +254,8 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     title = _COSTS if found.findings else _PREDICTS
     # Where the search went to and fro the coefficients are those of the joint fit.
     worst = _off_table(off[:_WORST], OVER_MODELS if found.probabilities else "one sigma of the joint fit")
-    return FirstScreen(tone, _in_lines(found.statements), tuple(costs), told, title, tag=tag, off=worst)
+    ladder = _strip(rungs, more, _RIGHT.format(_RECORDINGS))
+    return FirstScreen(tone, _in_lines(found.statements), tuple(costs), told, title, tag=tag, ladder=ladder, off=worst)
 
 
 def set_judged(found: SetDiagnosis) -> tuple[str, str]:
@@ -284,6 +293,7 @@ def render(first: FirstScreen, *pictures: str) -> str:
 
 
 HELD_OUT = "held-out error (sigma)"
+_RECORDINGS = "recordings"
 _RIGHT = "Held-out error: at {} that the fit has not seen; 1 is right."
 _WHITE = (
     "Held-out error: at {} that the fit has not seen, in white noise, in which models compare: what was learned as "
@@ -292,15 +302,22 @@ _WHITE = (
 
 
 def ladder_strip(summary: DiagnosisSummary, more: ReportExtras | None) -> str:
-    """Return a line for each model, the simplest first, and what the numbers are; empty where there is one model."""
-    d, use = summary.diagnosis, in_use(more)
-    rungs = error_ladder(d)
+    """Return the ladder of a diagnosis; empty where there is one model."""
+    d = summary.diagnosis
+    where = "rests" if d.fit.learns_scatter else "stops"
+    return _strip(error_ladder(d), more, (_WHITE if noise_learned(d.after) else _RIGHT).format(where))
+
+
+def _strip(rungs: Sequence[tuple[str, float]], more: ReportExtras | None, means: str) -> str:
+    """Return a line for each model, the simplest first, and what the numbers are; empty where there is one model.
+
+    `rungs`: names and held-out errors; `means`: what these are.
+    """
     if len(rungs) < 2:
         return ""
+    use = in_use(more)
     rows = [_line(name, k, len(rungs), error, use) for k, (name, error) in enumerate(rungs)]
-    columns = ["model", HELD_OUT]
-    where = "rests" if d.fit.learns_scatter else "stops"
-    told = [(_WHITE if noise_learned(d.after) else _RIGHT).format(where)]
+    columns, told = ["model", HELD_OUT], [means]
     if use is not None:
         columns.insert(1, f"position after {use.minutes:.0f} min")
         rows.insert(0, [use.names[0], metres(use.distance[0]), ""])

@@ -25,7 +25,7 @@ from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.drawing import html
 from sdimu_calibration.report.markup import Card, Draw, anchor, grid, prose, quiet, section, signs
 from sdimu_calibration.report.odds_section import odds_of_set, odds_section
-from sdimu_calibration.report.report_extras import ReportExtras
+from sdimu_calibration.report.report_extras import ReportExtras, of_navigations
 from sdimu_calibration.report.set_sections import recurrence_section, set_sections, where_it_fails
 from sdimu_calibration.report.statistics_section import noise_section
 from sdimu_calibration.report.table import as_far
@@ -118,6 +118,7 @@ def page(calibration: Calibration, contents: Contents) -> str:
         odds_of_set(of_set) if of_set is not None else "",
         recurrence_section(of_set.recurrence) if of_set is not None and of_set.recurrence else "",
         unknown_section(of_set.unknown, draw) if of_set is not None else "",
+        in_use(of_navigations(of_set.ladder), draw) if of_set is not None else "",
         *([] if calibration.of_set is None else set_sections(calibration, calibration.of_set, draw)),
         *([] if summary is None else _evidence(summary, more, _means(calibration, summary), spell, draw)),
         rests_section(calibration.rests) if calibration.rests else "",

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun
+from sdimu_calibration.core.estimation.free_inertial import FOUND, FreeInertialRun
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.recording import DataError, TableLog
 from sdimu_calibration.core.results import Calibration
 
-FOUND = "with what was found"
-"""Name of the model that has everything that a diagnosis found, where a navigation without aid has been tried."""
+if TYPE_CHECKING:  # a result of one recording has none: fifty modules less to load
+    from sdimu_calibration.core.joint.set_ladder import SetLadder
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,11 @@ class ReportExtras:
     """Why there is none."""
     given: Calibration | None = None
     """What a calibration delivers with the model as given, noise with a memory learned without what is missing."""
+
+
+def of_navigations(ladder: SetLadder) -> ReportExtras:
+    """Take the navigations of a set as those of one recording."""
+    return ReportExtras(trials=ladder.in_use, no_trial=ladder.not_tried)
 
 
 def report_extras(diagnosis: Diagnosis, delivered: Fit | None = None) -> ReportExtras:

@@ -18,7 +18,15 @@ from sdimu_calibration.report.report_extras import ReportExtras
 
 _NAUTICAL_MILE = 1852.0
 _INK = ((MUTED, "dot"), (BEFORE, "dash"), (AFTER, "solid"))
-_PLACES = {"end": "end of the recording", "start": "start of the recording"}
+_HOW = (
+    "At its first dwell the IMU levels by its own compensated accelerometers and is given its azimuth; then it "
+    "navigates freely through turns and stops, height held. The table stays in its place, so the whole drift is error. "
+    "Heading is compared with a fit to the whole recording. Predicted: by the covariance of the coefficients; one "
+    "segment is one draw, so up to two or three times the prediction is chance, more is not."
+)
+_SHORT = " There is no room for 10 minutes: the segments are as long as the recording allows."
+_OF_PARTS = "Each segment was held out of the fit that navigates it."
+_OF_OTHERS = "Each recording is navigated with what the other power-ons tell; biases of its own power-on are not known."
 _SKIP_S = 30.0
 """Logarithmic axes begin here: before there is nothing to see and much room for it."""
 _COLUMNS = (
@@ -37,26 +45,16 @@ def in_use(report_extras: ReportExtras, draw: Draw) -> str:
     heading = "What it means in use: navigation without aid"
     if not report_extras.trials:
         return section(heading, quiet(f"Not tried: {report_extras.no_trial}.")) if report_extras.no_trial else ""
-    rows = [_row(trial, drift) for trial in report_extras.trials for drift in trial.drifts]
-    short = min(trial.segment.length_s for trial in report_extras.trials) < WANTED_S - 1.0
+    trials = report_extras.trials
+    rows = [_row(trial, drift) for trial in trials for drift in trial.drifts]
+    short = min(trial.segment.length_s for trial in trials) < WANTED_S - 1.0
     return section(
         heading,
-        *(sentence(trial_sentence(trial)) for trial in report_extras.trials),
+        *(sentence(trial_sentence(trial)) for trial in trials),
         sentence(f"Together: {whole.sentence}.") if (whole := cost.in_use(report_extras)) else "",
-        draw(figure(report_extras.trials)),
+        draw(figure(trials)),
         grid(_COLUMNS, rows, {0, 1}),
-        quiet(
-            "Each segment was held out of the fit that navigates it. At its first dwell the IMU levels by its own "
-            "compensated accelerometers and is given its azimuth; then it navigates freely through turns and stops, "
-            "height held. The table stays in its place, so the whole drift is error. Heading is compared with a fit "
-            "to the whole recording. Predicted: by the covariance of that fit; one segment is one draw, so up to two "
-            "or three times the prediction is chance, more is not."
-            + (
-                " The recording is too short for 10 minutes: the segments are as long as half of it allows."
-                if short
-                else ""
-            )
-        ),
+        quiet(f"{_OF_OTHERS if trials[0].recording else _OF_PARTS} {_HOW}{_SHORT if short else ''}"),
     )
 
 
@@ -67,7 +65,8 @@ def trial_sentence(trial: FreeInertialRun) -> str:
         f"{drift.name} {cost.metres(drift.distance[-1])} ({_rate(drift):.2g} nmi/h{_promise(drift)})"
         for drift in trial.drifts
     )
-    return f"Error after {stretch.length_s / 60.0:.1f} min without aid at the {_PLACES[stretch.place]}: {ends}."
+    at = f"{stretch.place} of {trial.recording or 'the recording'}"
+    return f"Error after {stretch.length_s / 60.0:.1f} min without aid at the {at}: {ends}."
 
 
 def _promise(drift: Drift) -> str:
@@ -82,7 +81,7 @@ def _row(trial: FreeInertialRun, drift: Drift) -> list[str]:
     span = f"{stretch.begin_s / 60.0:.1f} to {(stretch.begin_s + stretch.length_s) / 60.0:.1f} min"
     return [
         drift.name,
-        f"{stretch.place}: {span}",
+        f"{trial.recording or stretch.place}: {span}",
         f"{drift.distance[-1]:.4g}",
         f"{_rate(drift):.2g}",
         three(promised) if np.isfinite(promised) else "",
@@ -101,7 +100,7 @@ def figure(trials: Sequence[FreeInertialRun]) -> Figure:
     made = Figure(
         rows=3,
         cols=len(trials),
-        titles=[f"unseen {_PLACES[t.segment.place]}" for t in trials],
+        titles=[t.recording or f"unseen {t.segment.place} of the recording" for t in trials],
         share_x=True,
         share_y=True,
         gap_y=0.06,

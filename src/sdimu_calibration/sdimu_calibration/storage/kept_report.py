@@ -24,7 +24,7 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.storage.files.whole_file import beside
 
-REPORT_FORMAT = "sdimu-reduction/6"
+REPORT_FORMAT = "sdimu-reduction/7"
 """What a recording says: a line, then an NPZ file of plain arrays; no code is loaded from it."""
 SUFFIX = ".reduction"
 LONGEST = 1 << 28

@@ -246,6 +246,7 @@ def job_number(job: Job) -> str:
         job.with_local,
         job.stretches,
         job.rivals,
+        [(one.model, one.names, one.values.tobytes(), one.covariance.tobytes()) for one in job.others],
     )
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
 

@@ -20,6 +20,7 @@ from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.joint.set_found import FunctionShare
+from sdimu_calibration.core.joint.set_ladder import SetLadder
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, verdict_of_set
 from sdimu_calibration.core.joint.set_verdict import statements as statements_of_set
 from sdimu_calibration.core.noise_term import ATTITUDE, FLICKER, STOP, NoiseTerm
@@ -375,7 +376,7 @@ def test_the_page_of_a_set_does_not_call_wrong_what_it_tells_to_use(summary, ver
         statements=("x",),
         before=d.before,
         after=after,
-        error_without=None,
+        ladder=SetLadder(),
         findings=findings,
         advice=(),
         probabilities=Probabilities(0.9, (), ()) if error == 1.0 else None,

@@ -68,13 +68,13 @@ def test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_h
     with_it = found.after.fit["held_out_rms"]
     assert [f.label for f in found.findings] == ["accel_quadratic_x"]
     assert with_it < 1.25
-    assert found.before.fit["held_out_rms"] < 0.5 * found.error_without
-    assert found.error_without > 1.5 * with_it
+    assert found.before.fit["held_out_rms"] < 0.5 * found.ladder.error_without
+    assert found.ladder.error_without > 1.5 * with_it
     # The sentence is of the effects: an error near 1 may stand beside a coefficient that is far off.
     shown = re.sub("<[^>]+>", "", first_screen.of_set(found).head)
     assert found.sentence == shown.replace("\N{PLUS-MINUS SIGN}", "+-").replace("\u00a0", " ")
     assert not re.search(r"held out|->", found.sentence)
-    assert first_screen.of_set(found).costs[-1][0].startswith(f"{found.error_without:.2f} ")
+    assert f"<td>{found.ladder.error_without:.3f}</td>" in first_screen.of_set(found).ladder
 
 
 def test_a_model_without_one_of_its_coefficients_predicts_worse(two):

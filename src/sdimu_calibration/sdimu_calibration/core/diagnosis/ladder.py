@@ -13,6 +13,7 @@ from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.diagnosis.rounds import Round, in_found_noise
 from sdimu_calibration.core.error_figures import held_out, log_likelihood, nis
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.estimation.free_inertial import AS_GIVEN, FOUND
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.outcome import outcome
@@ -57,7 +58,7 @@ class Rung:
     @property
     def name(self) -> str:
         """Of the model, as a ladder tells it."""
-        return f"+ {self.added}" if self.added else "model as given"
+        return rung_name(self.added)
 
 
 def ladder(request: Request, fit: Fit, final: Fit, done: Round, progress: Progress) -> tuple[Rung, ...]:
@@ -107,10 +108,15 @@ def error_ladder(d: Diagnosis) -> list[tuple[str, float]]:
     """
     if d.rungs:
         return [(r.name, r.held_out_rms) for r in d.rungs]
-    first = ("model as given", held_out(d.before))
+    first = (AS_GIVEN, held_out(d.before))
     added = [c.label for c in d.chosen]
-    name = f"+ {added[0]}" if len(added) == 1 else "with what was found"
+    name = rung_name(added[0]) if len(added) == 1 else FOUND
     return [first, (name, held_out(d.after))] if added else [first]
+
+
+def rung_name(added: str) -> str:
+    """Name a model by what it has beyond the one before; empty for the first."""
+    return f"+ {added}" if added else AS_GIVEN
 
 
 def _rung(

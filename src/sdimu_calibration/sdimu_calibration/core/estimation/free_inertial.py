@@ -20,7 +20,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, f
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.effects import bias
-from sdimu_calibration.core.estimation.holdout import Segment, holdout_segments, part
+from sdimu_calibration.core.estimation.holdout import Segment, holdout_segments, part, unseen_segment
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 
 NOTHING = "no compensation"
+AS_GIVEN, FOUND = "model as given", "with what was found"
+"""Names of the first model and of the last, where navigations without aid compare models."""
 _WIDE_LEVEL = 1e-2
 """Sigma of the level before levelling (rad): nothing is known."""
 _BLIND = 1.0
@@ -86,6 +88,8 @@ class FreeInertialRun:
     segment: Segment
     drifts: tuple[Drift, ...]
     """Without compensation, then with each model."""
+    recording: str = ""
+    """Its name in a set; empty where there is one recording."""
 
     @property
     def ends(self) -> tuple[Drift, ...]:
@@ -144,6 +148,67 @@ def _run(
         again = _in_learned_noise(again, fit, segment)
         drifts.append(free_navigation(name, prepared, again, fit.setup, segment, reference))
     return FreeInertialRun(segment, tuple(drifts))
+
+
+@dataclass(frozen=True)
+class OfOthers:
+    """Coefficients of a unit that other recordings tell, with one model."""
+
+    model: str
+    """What people call the model."""
+    names: tuple[str, ...]
+    """Of the coefficients that the others know, length P; those that the model lacks are zero."""
+    values: Floats
+    """Shape (P,). SI."""
+    covariance: Floats
+    """Shape (P, P). Of the coefficients in a power-on that the others have not seen."""
+
+
+def navigation_with(fit: NavigationFit, others: Sequence[OfOthers]) -> FreeInertialRun:
+    """Navigate the begin of a recording uncompensated and with what other recordings tell.
+
+    Parameters
+    ----------
+    fit : NavigationFit
+        Of the recording, with every coefficient of `others`: how errors are taken out, the azimuth at the start, and
+        what heading is compared with. What it knows alone is used only where it serves the estimate (an unknown
+        azimuth).
+
+    Raises
+    ------
+    DataError
+        Where the recording is too short.
+    """
+    prepared, reference = fit.prepared, fit.known.output
+    segment = unseen_segment(prepared)
+    drifts = [free_navigation(NOTHING, prepared, None, fit.setup, segment, reference)]
+    for one in others:
+        seen = _in_wander(_told(fit, one), fit, segment)
+        drifts.append(free_navigation(one.model, prepared, seen, fit.setup, segment, reference))
+    return FreeInertialRun(segment, tuple(drifts))
+
+
+def _told(fit: NavigationFit, others: OfOthers) -> Refit:
+    """Put what others tell into the coefficients of a fit; faults of its recording alone are not known to them."""
+    names, place = fit.setup.sensors.names, {name: k for k, name in enumerate(others.names)}
+    known = np.array([k for k, name in enumerate(names) if name in place], dtype=np.int64)
+    source = np.array([place[names[k]] for k in known], dtype=np.int64)
+    estimate, covariance = np.zeros(len(names)), np.zeros((len(names), len(names)))
+    estimate[known] = others.values[source]
+    covariance[np.ix_(known, known)] = others.covariance[np.ix_(source, source)]
+    serving = np.arange(fit.bare.coefficients, len(names))
+    estimate[serving] = fit.estimate[serving]
+    covariance[np.ix_(serving, serving)] = fit.estimate_covariance[np.ix_(serving, serving)]
+    return Refit(fit, estimate, covariance)
+
+
+def _in_wander(seen: Refit, fit: NavigationFit, segment: Segment) -> Refit:
+    """Add to the covariance what the biases of a recording wander from their mean in a segment of it."""
+    if fit.noise is None:
+        return seen
+    evidence = cast(NavigationEvidence, fit.bare).in_inner(fit.wander.inner)
+    at, none = (segment.begin_s, segment.begin_s + segment.length_s), np.zeros(len(evidence.epoch), dtype=np.bool_)
+    return replace(seen, covariance=seen.covariance + doubt_in_stretch(evidence, none, fit.wander, fit.noise.terms, at))
 
 
 def _in_learned_noise(again: Refit, fit: NavigationFit, segment: Segment) -> Refit:

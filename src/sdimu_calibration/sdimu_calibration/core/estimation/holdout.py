@@ -53,19 +53,42 @@ def holdout_segments(prepared: PreparedData) -> tuple[Segment, ...]:
 
     Of a recording too short for that, the longest segments that leave half of it to the fit.
     """
-    used, epochs = prepared.phases.used, prepared.epochs
-    index = np.arange(len(used))
-    begun = np.maximum.accumulate(np.where(used, -1, index)) + 1
-    rested = np.where(used, epochs.end - epochs.start[np.minimum(begun, len(used) - 1)], 0.0)
-    level = np.minimum(rested, LEVEL_S)
-    # Where a dwell ends, or has lasted long enough.
-    ready = (rested >= _LEAST_LEVEL_S) & (np.append(~used[1:], True) | (rested >= LEVEL_S - 1e-6))
+    ready, level = _ready(prepared)
     found = [s for s in (_at_end(prepared, ready, level), _at_start(prepared, ready, level)) if s]
     if not found:
         raise DataError(
             f"the recording is too short to keep {LEAST_S:.0f} s after a dwell from the fit and leave half of it"
         )
     return tuple(found)
+
+
+def unseen_segment(prepared: PreparedData) -> Segment:
+    """Choose what to navigate of a recording that no fit has seen: `WANTED_S` after its first dwell, or what there is.
+
+    Raises
+    ------
+    DataError
+        Where less than `LEAST_S` is left after a dwell.
+    """
+    ready, level = _ready(prepared)
+    if ready.any():
+        at, end = int(np.argmax(ready)), prepared.epochs.end
+        last = int(np.searchsorted(end, end[at] + WANTED_S + 1e-6, side="right"))
+        segment = _segment("start", prepared, _level_from(prepared, at, level), at, last, (0, at + 1))
+        if segment is not None:
+            return segment
+    raise DataError(f"the recording is too short to navigate {LEAST_S:.0f} s after a dwell")
+
+
+def _ready(prepared: PreparedData) -> tuple[Bools, Floats]:
+    """After which epochs a navigation may begin, and how long the dwell before it levels (s); both shape (e,)."""
+    used, epochs = prepared.phases.used, prepared.epochs
+    index = np.arange(len(used))
+    begun = np.maximum.accumulate(np.where(used, -1, index)) + 1
+    rested = np.where(used, epochs.end - epochs.start[np.minimum(begun, len(used) - 1)], 0.0)
+    # Where a dwell ends, or has lasted long enough.
+    ready = (rested >= _LEAST_LEVEL_S) & (np.append(~used[1:], True) | (rested >= LEVEL_S - 1e-6))
+    return ready, np.minimum(rested, LEVEL_S)
 
 
 def _at_end(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | None:

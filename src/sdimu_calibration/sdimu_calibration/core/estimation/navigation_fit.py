@@ -20,7 +20,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH, azimuth_note, azimuth_warning
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, conditions, counts_of
 from sdimu_calibration.core.estimation.fit_words import MISFIT, in_noise_in_words, stated_priors
-from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun, free_inertial_runs
+from sdimu_calibration.core.estimation.free_inertial import AS_GIVEN, FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
 from sdimu_calibration.core.estimation.site_rows import at_site, with_found
@@ -452,7 +452,7 @@ class NavigationFit(Fit):
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
-        fits = [("model as given", self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
+        fits = [(AS_GIVEN, self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
         # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
         return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)
 

@@ -16,6 +16,7 @@ from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.effects.imu_model import told_apart
 from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.free_inertial import FreeInertialRun, OfOthers, navigation_with
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import term_in_words
@@ -84,6 +85,8 @@ class Job:
     """Whose weights are coefficients, too; noise is learned beside them."""
     rivals: bool = False
     """Also what the recording says in each noise that it may have."""
+    others: tuple[OfOthers, ...] = ()
+    """Coefficients with which the recording is navigated without aid, in place of candidates."""
 
     @property
     def of_fit(self) -> str:
@@ -152,6 +155,8 @@ class Report:
     """That of the set in which the rows are, shape (3,); None is the run's own."""
     fault_kinds: tuple[str, ...] = ()
     """Kinds of the faults of the recording, as of `DataFault`."""
+    in_use: FreeInertialRun | None = None
+    """Navigations without aid, where they were asked for and the recording is long enough."""
 
     @property
     def stands_alone(self) -> bool:
@@ -272,7 +277,18 @@ def _report(job: Job, fit: Fit) -> Report:
         _equations(fit, job),
         job.scatter,
         tuple(dict.fromkeys(f.kind for f in fit.faults)),
+        _in_use(fit, job),
     )
+
+
+def _in_use(fit: Fit, job: Job) -> FreeInertialRun | None:
+    """Navigate the recording with what others tell of the unit; None where that was not asked for, or cannot be."""
+    if not job.others or not isinstance(fit, NavigationFit):
+        return None
+    try:
+        return replace(navigation_with(fit, job.others), recording=job.member.name)
+    except DataError:
+        return None
 
 
 def _with_function(evidence: LinearEvidence, fit: Fit, job: Job) -> tuple[LinearEvidence, tuple[NoiseTerm, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,9 +26,10 @@ from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
 from sdimu_calibration.core.joint.scope import split_tag, tagged
-from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences, held_out
+from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch
+from sdimu_calibration.core.joint.set_ladder import SetLadder, set_ladder
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
 from sdimu_calibration.core.joint.set_search import SetRequest, place_of, place_of_local
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
@@ -67,9 +68,9 @@ class SetDiagnosis:
     """What comes back of that what the model leaves in the stops; None where it leaves nothing."""
     refused: tuple[SetFinding, ...] = ()
     """Effects that were found and taken back, as an unknown function of the attitude explains them."""
-    error_without: float | None = None
-    """Held-out error (sigma) without the effects that were found in all recordings, in the noise of the model with
-    them. By itself that model learns in each recording what it lacks as noise, and its own error hides it."""
+    ladder: SetLadder = field(default_factory=SetLadder)
+    """Models from that as given to that with what was found in all recordings, in the noise of the last. By itself the
+    model as given learns in each recording what it lacks as noise, and its own error hides it."""
     probabilities: Probabilities | None = None
     """Of nothing, and of each family of effects in all recordings, at the end of the search; None where it did not come
     to an end."""
@@ -127,7 +128,7 @@ def diagnose_set(
         found.first,
         again,
         refused,
-        _error_without(found),
+        set_ladder(found, run),
         facts.told,
         unknown_functions(found.after) if facts.beside_function else (),
         done.functions,
@@ -159,14 +160,6 @@ def _explained(again: Recurrence | None, found: SetSearch, labels: Sequence[str]
     share = f" ({in_percent(common.probability)})" if found.stood else ""
     where = f"{listing(common.sensors)}{share}"
     return (f"An unknown function of the {of_what} in {where}, the same in all recordings, explains it.", *too)
-
-
-def _error_without(found: SetSearch) -> float | None:
-    """Held-out error without what was chosen, in the noise of the fit with it; None where nothing can be held out."""
-    names = found.after.names
-    lacks = [names[place_of(names, c)] for c in found.chosen]
-    told = held_out(found.after, lacks)
-    return None if told is None else told.rms
 
 
 def _findings(found: SetSearch) -> tuple[SetFinding, ...]:

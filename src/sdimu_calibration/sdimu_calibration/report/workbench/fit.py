@@ -24,6 +24,7 @@ from sdimu_calibration.core.diagnosis.survey import survey
 from sdimu_calibration.core.effects import imu_model
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.fit import Fit, Start
+from sdimu_calibration.core.estimation.free_inertial import FOUND
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.outcome import outcome
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
@@ -40,7 +41,7 @@ from sdimu_calibration.core.verdict import Verdict
 from sdimu_calibration.report import data
 from sdimu_calibration.report.cost import InUse, Off, in_use, wrong_without
 from sdimu_calibration.report.may_be import MayBe, classes_of
-from sdimu_calibration.report.report_extras import FOUND, ReportExtras
+from sdimu_calibration.report.report_extras import ReportExtras
 from sdimu_calibration.report.unknown_section import unknown_of
 from sdimu_calibration.report.workbench.axes import axes
 from sdimu_calibration.report.workbench.own_effect import added_effects, named, stated_priors

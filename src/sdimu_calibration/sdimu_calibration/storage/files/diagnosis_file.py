@@ -316,8 +316,8 @@ def _recurrence(found: Recurrence) -> dict[str, Any]:
     return {"answer": list(found.answer), "apart": found.apart, **asdict(found)}
 
 
-def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
-    """Write diagnosis.json of a set."""
+def write_set_diagnosis(path: Path, found: SetDiagnosis, in_use: Row = None) -> None:
+    """Write diagnosis.json of a set. `in_use`: as `report.cost.in_use_entry` has it."""
     is_unexplained = found.verdict == Verdict.UNEXPLAINED
     DiagnosisFile.model_construct(
         format=FORMAT,
@@ -338,6 +338,8 @@ def write_set_diagnosis(path: Path, found: SetDiagnosis) -> None:
         alone=alone(found.first.evidence),
         known=KnownEntry.of(found.standing),
         fit={"before": fit_of(found.before), "after": fit_of(found.after)},
+        grown=[{"added": label, "held_out_rms": error} for label, error in found.ladder.rungs],
+        in_use=in_use,
         function=found.function,
         functions=[asdict(one) | {"sensors": list(one.sensors)} for one in found.functions],
         refused=[f.label for f in found.refused],
@@ -357,7 +359,7 @@ def _of_set(f: SetFinding, found: SetDiagnosis) -> dict[str, Any]:
         "delta_log_likelihood": 0.5 * f.z**2,
         "p_value_adjusted": found.first.p_value_of(f.z),
         "explained": float("nan"),
-        "held_out_rms_before": found.error_without,
+        "held_out_rms_before": found.ladder.error_without,
         "held_out_rms_after": found.after.fit["held_out_rms"],
         "indistinguishable_from": list(f.alike),
         **entry(f, "recording against"),
