@@ -197,6 +197,13 @@ LONG = {
         "test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_have_it",
         "test_what_chance_reaches_is_known_for_two_recordings",
     ),
+    "test/sdimu_calibration/core/joint/test_near_equations.py": (
+        "test_a_set_tells_an_equation_in_the_place_of_wrong_effects",
+    ),
+    "test/sdimu_calibration/core/joint/test_set_ladder.py": (
+        "test_each_model_has_its_error_and_its_metres",
+        "test_page_file_and_words_tell_the_same_metres",
+    ),
     "test/sdimu_calibration/core/joint/test_recurrence.py": (
         "test_recordings_in_the_same_order_do_not_tell_attitude_from_time",
     ),

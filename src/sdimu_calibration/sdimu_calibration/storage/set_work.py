@@ -247,6 +247,7 @@ def job_number(job: Job) -> str:
         job.stretches,
         job.rivals,
         [(one.model, one.names, one.values.tobytes(), one.covariance.tobytes()) for one in job.others],
+        job.equations,
     )
     return hashlib.sha256(repr(asked).encode()).hexdigest()[:40]
 

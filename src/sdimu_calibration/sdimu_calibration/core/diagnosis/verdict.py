@@ -41,9 +41,10 @@ _COLOURED = 1.2
 minutes."""
 _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
-_EQUATION = "Missing for certain, and fitted by"
+FITTED_BY = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 
+NONE_FITS = "No effect of the catalogue fits, an equation does."
 IF_NONE = "as noise, and may be too small if it is none"
 """What is said of sigmas that hold something unexplained."""
 _FITTED = "In what was fitted, but not beyond it"
@@ -110,14 +111,14 @@ def statements(d: Diagnosis, found: Sequence[Found], held: bool = True) -> tuple
         grave = [f.text for f in d.findings if f.grave]
         return (f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found),)
     every = _graded(d, [one for one in found if not _is_fault(one)])
-    firm = (_EQUATION if d.own else "Certain") if held else _FITTED
+    firm = (FITTED_BY if d.own else "Certain") if held else _FITTED
     told = tuple(text for text in (*each_grade(every, firm), _of_recording(d, found)) if text)
     if d.verdict == Verdict.UNEXPLAINED:
         return _unexplained(d, told)
     if not d.chosen and d.probabilities is not None:
         return (something_missing(d.probabilities),)
     # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    return ("No effect of the catalogue fits, an equation does.", *told) if d.own else told
+    return (NONE_FITS, *told) if d.own else told
 
 
 def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:

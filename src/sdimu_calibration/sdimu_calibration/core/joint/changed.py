@@ -14,7 +14,7 @@ import numpy as np
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import REFERENCES, Effect
 from sdimu_calibration.core.effects.imu_model import prior_size
-from sdimu_calibration.core.evidence.candidate import Candidate
+from sdimu_calibration.core.evidence.candidate import OWN, Candidate
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.same_unit import SHARE
 from sdimu_calibration.core.joint.scope import split_tag, tagged
@@ -35,7 +35,7 @@ def stable_effects(model: Model, varying: Collection[str]) -> list[Effect]:
     effects = [selection.resolve(e) for e in model.effects]
     stable = [e for e in effects if e.scope == "unit" and (e.family or e.name) not in varying]
     # The key of a coefficient alone is what a recording is fitted with.
-    return [e for e in stable if e.group != REFERENCES and not e.file]
+    return [e for e in stable if e.group != REFERENCES and not e.file and e.title != OWN]
 
 
 def change_of(label: str, imu: ImuSpecification) -> Candidate:

@@ -13,10 +13,11 @@ from sdimu_calibration.core.diagnosis.grades import NAMED
 from sdimu_calibration.core.joint.function_fit import with_function
 from sdimu_calibration.core.joint.leftovers import ATTITUDE, StopError, leftovers
 from sdimu_calibration.core.joint.member import Member
+from sdimu_calibration.core.joint.near_equations import asks_for_equations, near_equations
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch, following
-from sdimu_calibration.core.joint.set_search import SetRequest, search_beside, search_set, search_without
+from sdimu_calibration.core.joint.set_search import SetRequest, search_beside, search_set, search_with, search_without
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,24 @@ class Searched:
 
 
 def searched(members: Sequence[Member], request: SetRequest, fitted: SetFit | None = None) -> Searched:
-    """Search a set; parameters as for `search_set`."""
+    """Search a set, with equations where what is found asks for them; parameters as for `search_set`."""
+    done = _without_equations(members, request, fitted)
+    if not asks_for_equations(done.found):
+        return done
+    request.progress("equations", 0.8)
+    near = near_equations(done.found, request.run)
+    if not near:
+        return done
+    found = search_with(done.found, near, request)
+    if not any(c.family == "own" for c in found.chosen):
+        return done
+    if found.after.function is not None and not found.function_is_likely:
+        found = search_without(found, replace(request, extra=(*request.extra, *near)))
+    left = leftovers(found.alone, request.run, found.before.names)
+    return Searched(found, None, recurrence(left), (), left.where)
+
+
+def _without_equations(members: Sequence[Member], request: SetRequest, fitted: SetFit | None) -> Searched:
     found = search_set(members, request, fitted)
     beside = found if found.after.function is not None else None
     if beside is not None and not beside.function_is_likely:

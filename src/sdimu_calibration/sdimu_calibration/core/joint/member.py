@@ -27,6 +27,7 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.run_rows import RunRows
+from sdimu_calibration.core.joint.equation_share import EquationShare, equation_share
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
 from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
@@ -87,6 +88,8 @@ class Job:
     """Also what the recording says in each noise that it may have."""
     others: tuple[OfOthers, ...] = ()
     """Coefficients with which the recording is navigated without aid, in place of candidates."""
+    equations: tuple[str, ...] | None = None
+    """Coefficients that were told, beside which the recording says what it holds of equations; None: nothing."""
 
     @property
     def of_fit(self) -> str:
@@ -157,6 +160,8 @@ class Report:
     """Kinds of the faults of the recording, as of `DataFault`."""
     in_use: FreeInertialRun | None = None
     """Navigations without aid, where they were asked for and the recording is long enough."""
+    equations: EquationShare | None = None
+    """What it says of equations, where that was asked for."""
 
     @property
     def stands_alone(self) -> bool:
@@ -278,6 +283,7 @@ def _report(job: Job, fit: Fit) -> Report:
         job.scatter,
         tuple(dict.fromkeys(f.kind for f in fit.faults)),
         _in_use(fit, job),
+        None if job.equations is None else equation_share(fit, job.equations),
     )
 
 

@@ -96,6 +96,19 @@ def search_beside(found: SetSearch, fit: SetFit, request: SetRequest) -> SetSear
     return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
 
 
+def search_with(found: SetSearch, extra: Sequence[Effect], request: SetRequest) -> SetSearch:
+    """Search again with more candidates; what was found is a candidate again.
+
+    Parameters
+    ----------
+    extra : sequence of Effect
+        Tried with the catalogue.
+    """
+    wider = replace(request, extra=(*request.extra, *extra))
+    again = _searched(found.before, found.after, found.told, wider, asks=False)
+    return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
+
+
 def _searched(
     before: SetFit, fit: SetFit, told: tuple[Candidate, ...], request: SetRequest, asks: bool = True
 ) -> SetSearch:
@@ -318,7 +331,8 @@ def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Seque
     for candidate in chosen:
         if candidate.recording or candidate.coefficient in old or candidate.label in have:
             continue
-        effect = selection.resolve(candidate.label) if not candidate.effect.file else candidate.effect
+        stands = candidate.effect.file or candidate.family == "own"
+        effect = candidate.effect if stands else selection.resolve(candidate.label)
         for _ in range(2):
             if effect.nearer is None:
                 break

@@ -10,7 +10,15 @@ import numpy as np
 from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
 from sdimu_calibration.core.diagnosis.found import DECIDED
 from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, each_grade, named, size, without_variant
-from sdimu_calibration.core.diagnosis.verdict import IF_NONE, Facts, nothing_missing, something_missing, verdict
+from sdimu_calibration.core.diagnosis.verdict import (
+    FITTED_BY,
+    IF_NONE,
+    NONE_FITS,
+    Facts,
+    nothing_missing,
+    something_missing,
+    verdict,
+)
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import answer_in_words
@@ -86,6 +94,11 @@ class SetFacts:
     """Noise that no sensor has by itself, nearly certain, by the recording."""
 
     @property
+    def own(self) -> bool:
+        """Whether an equation that no physics names was found."""
+        return any(f.family == "own" for f in self.findings)
+
+    @property
     def beside_function(self) -> bool:
         """Whether an unknown function of the attitude, the same in all recordings, explains what is left."""
         return any(one.is_common for one in self.functions)
@@ -115,7 +128,8 @@ def verdict_of_set(facts: SetFacts) -> Verdict:
     # A search that came to no end says that something is missing.
     unexplained |= not findings and facts.told is None
     nothing = 1.0 if facts.told is None else facts.told.nothing
-    return verdict(Facts(shared, len(findings) - len(shared), unexplained=unexplained, nothing=nothing))
+    faults = len(findings) - len(shared)
+    return verdict(Facts(shared, faults, unexplained=unexplained, own=facts.own, nothing=nothing))
 
 
 def _scatter(result: Calibration) -> float:
@@ -145,14 +159,14 @@ def _found(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
         return (f"The model explains all recordings together{mark} {how}{nothing_missing(told)}.",)
     if word == Verdict.DATA_FAULT:
         return (_of_recordings(findings), *_of_each(facts))
-    every = each_grade(list(map(_graded, findings))) if findings else ()
+    every = each_grade(list(map(_graded, findings)), FITTED_BY if facts.own else "Certain") if findings else ()
     if word == Verdict.UNEXPLAINED:
         odd = () if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
         what = "The recordings share something" if shared else "Something differs between the recordings"
         beside = ("Found beside it:", *every) if every else ()
         return (f"{what} that no effect of the catalogue explains.", *beside, *odd, *_of_each(facts))
-    return every
+    return (NONE_FITS, *every) if facts.own else every
 
 
 def _of_recordings(findings: Sequence[SetFinding]) -> str:
