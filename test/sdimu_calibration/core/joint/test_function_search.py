@@ -23,6 +23,11 @@ class Found:
     probability: float = 0.0
     stood: bool = True
     posterior: str = ""
+    families: tuple[str, ...] = ()
+
+    @property
+    def chosen(self):
+        return tuple(SimpleNamespace(family=family) for family in self.families)
 
     @property
     def alone(self):
@@ -54,6 +59,9 @@ class Stage:
     again: Recurrence | None = None
     beside: Found = field(default_factory=lambda: Found("beside", "function", 0.9))
     asked: list[str] = field(default_factory=list)
+    near: tuple[str, ...] | None = None
+    """Equations that come near; None where the search asks for none."""
+    wider: Found = field(default_factory=lambda: Found("wider"))
 
     def put(self, monkeypatch):
         def without(*_):
@@ -73,7 +81,14 @@ class Stage:
             self.asked.append(f"left by {fit}")
             return SimpleNamespace(where=(f"left by {fit}",))
 
+        def search_with(_, extra, __):
+            self.asked += [f"with {one}" for one in extra]
+            return self.wider
+
         for name, what in (
+            ("asks_for_equations", lambda _: self.near is not None),
+            ("near_equations", lambda *_: self.near),
+            ("search_with", search_with),
             ("search_set", lambda *_: self.first),
             ("search_without", without),
             ("search_beside", search_beside),
@@ -152,3 +167,27 @@ def test_recordings_that_were_left_out_stay_named_after_a_refit(monkeypatch):
     monkeypatch.setattr(set_search, "_with", lambda options, _: options)
     again = SetRequest(None, None).fit((), before)  # type: ignore[arg-type]
     assert again == replace(before, members=("r0",), left_out=(("r2", "no status"), ("r1", "clipped")))
+
+
+def test_an_equation_that_is_chosen_replaces_what_was_told(monkeypatch):
+    stage = Stage(Found("first", families=("a", "b", "c")), near=("ax^2 az",), wider=Found("wider", families=("own",)))
+    done = stage.put(monkeypatch)
+    assert stage.asked == ["left by fit of first", "with ax^2 az", "left by fit of wider"]
+    assert (done.found, done.without, done.functions) == (stage.wider, None, ())
+    assert done.where == ("left by fit of wider",)
+
+
+def test_a_function_that_an_equation_explains_is_left_out(monkeypatch):
+    stage = Stage(
+        Found("asked", "function", 0.8), near=("ax^3",), wider=Found("wider", "function", 0.1, families=("own",))
+    )
+    assert stage.put(monkeypatch).found.name == "without"
+    assert stage.asked == ["left by fit of asked", "with ax^3", "without", "left by fit of without"]
+
+
+@pytest.mark.parametrize("near", [(), ("ax^3",)])
+def test_where_no_equation_comes_near_or_is_chosen_all_stays(monkeypatch, near):
+    stage = Stage(Found("asked", "function", 0.8), again=returns(0.3), near=near, wider=Found("wider", families=("a",)))
+    done = stage.put(monkeypatch)
+    assert done.found is stage.first
+    assert [one.probability for one in done.functions] == [0.8]

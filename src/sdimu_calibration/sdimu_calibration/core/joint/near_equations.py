@@ -25,15 +25,15 @@ from sdimu_calibration.core.joint.set_search import place_of
 from sdimu_calibration.core.recording import DataError
 
 _MANY = 3
-"""Number of effects (1) from which one equation is tried in their place, as in one recording."""
+"""Number of effects from which one equation is tried in their place: so many may be the parts of one cause."""
 _MEMBER = 6.0
 """Log posterior (1) that a model gains with each effect that one equation stands for: its odds and its freedom."""
 _LEAST = 2.0
 """Log likelihood (1) that an equation gains at least, its members counted: two sigma, less is chance of hundreds."""
 _MOST = 40
-"""Number of equations that are weighed at most, those that gain most first."""
+"""Number of equations that are weighed at most: each is a column of every recording; a cause has some look-alikes."""
 _EVERY = 6
-"""Number of told effects up to which each choice of them may be left out: of more, one or two, or all."""
+"""Number of told effects up to which any of them may be left out: of more one or two, or all, as choices double."""
 
 
 def asks_for_equations(found: SetSearch) -> bool:
