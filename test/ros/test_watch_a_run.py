@@ -15,6 +15,14 @@ from .conftest import DEADLINE_S, sdimu, write_plan
 
 pytestmark = pytest.mark.ros
 EFFECT = "gyro_scale_asymmetry_y"
+OWN = """\
+format: sdimu-effect/1
+name: bent_force
+expressions:
+  accel_x: k * ax**2
+parameters:
+  k: {unit: ug/g^2, prior: 30 ug/g^2}
+"""
 
 
 def told(text: str, stop: int) -> tuple[str, str]:
@@ -42,6 +50,8 @@ def start_run(tmp_path: Path, domain: int, dwell_s: float) -> Popen[str]:
 
 
 def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, apart: int) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(OWN)
     run = start_run(tmp_path, apart, 40.0)
     watch = None
     try:
@@ -49,7 +59,7 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, ap
         while not (tmp_path / "run" / "log" / "calibration.log").exists():
             assert time.monotonic() - begun < DEADLINE_S
             time.sleep(0.2)
-        watch = sdimu("watch", "--add", EFFECT)
+        watch = sdimu("watch", "--add", EFFECT, "--add", own)
         done, seen = both_ended(run, watch, tmp_path / "run")
     finally:
         for process in (run, watch):
@@ -58,9 +68,14 @@ def test_watch_finds_the_run_joins_late_adds_and_ends_with_it(tmp_path: Path, ap
     for stop in (1, 2):
         one, other = (re.sub(r"\d+ of", "of", told(text, stop)[0]) for text in (done, seen))
         assert one == other
-    assert f"the test adds {EFFECT}: its filter goes through all samples so far again" in seen
-    assert seen.count(f"{EFFECT} is in the model\n") == 1
-    assert read_result(tmp_path / "run").names[-1] == EFFECT
+    assert f"the test adds {EFFECT} and {own}: its filter goes through all samples so far again" in seen
+    assert seen.count(f"bent_force_k and {EFFECT} are in the model\n") == 1
+    result = read_result(tmp_path / "run")
+    assert result.names[-2:] == (EFFECT, "bent_force_k")
+    # The diagnosis at the end is of the same model.
+    assert result.origin.effect_files == (str(own),)
+    assert f"<code>{own}</code>" in (tmp_path / "run" / "report.html").read_text()
+    assert "not in what was diagnosed" not in done
 
 
 def test_watch_that_began_first_waits_for_the_run(tmp_path: Path, apart: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import importlib.metadata
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rate_table_sim.core.specification import TableSpecification
+from sdimu_calibration.core.compensation.compensator import resolved
 from sdimu_calibration.core.effects import registry
 from sdimu_calibration.core.estimation.outcome import calibrate
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import solve
+from sdimu_calibration.core.origin import Origin
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.specification import Site
@@ -27,7 +30,9 @@ from sdimu_calibration.storage.files.effect_file import (
     find_effects,
     load_effect,
     si_unit,
+    without_file,
 )
+from sdimu_calibration.storage.files.result_file import read_result, write_result
 from sdimu_sim.core.scenario import Scenario, generate
 
 TWIN = """\
@@ -38,6 +43,9 @@ expressions:
 parameters:
   k: {unit: ug/g^2, prior: 30 ug/g^2}
 """
+TWO = TWIN.replace("k * ax**2", "k * ax**2 + m * ax * wtz").replace(
+    "prior: 30 ug/g^2}", "prior: 30 ug/g^2}\n  m: {unit: ug*s/deg/g, prior: 5 ug*s/deg/g}"
+)
 SITE = Site(latitude_rad=float(np.radians(36.4)))
 
 
@@ -82,10 +90,7 @@ def test_as_a_candidate_it_has_the_signature_of_its_twin(write, recording):
 
 
 def test_each_parameter_has_its_own_name_unit_and_prior(write):
-    text = TWIN.replace("k * ax**2", "k * ax**2 + m * ax * wtz").replace(
-        "prior: 30 ug/g^2}", "prior: 30 ug/g^2}\n  m: {unit: ug*s/deg/g, prior: 5 ug*s/deg/g}"
-    )
-    k, m = load_effect(write(text))
+    k, m = load_effect(write(TWO))
     assert (k.parameters[0].name, m.parameters[0].name) == ("bent_force_k", "bent_force_m")
     assert k.parameters[0].unit == "m/g^2/s^2"
     assert m.prior["mems"] == pytest.approx(5e-6 * 9.80665 * 180.0 / np.pi)
@@ -169,6 +174,37 @@ def test_what_came_to_a_model_is_told_by_its_names():
     added = ["accel_quadratic_z", "gyro_bias_warm_up_y(tau=600 s)", "gyro_x: ey^2"]
     assert added_to("baseline", (*result, "of my own")) == added
     assert added_to("baseline", load_model("baseline").effects) == []
+
+
+@pytest.mark.parametrize(("part", "names"), [("", ("bent_force_k", "bent_force_m")), (":m", ("bent_force_m",))])
+def test_a_result_names_the_files_of_its_own_effects_by_which_they_are_added_again(
+    write, recording, tmp_path, monkeypatch, part, names
+):
+    write(TWO)
+    monkeypatch.chdir(tmp_path)  # named as seen from there, and found from anywhere
+    begun = calibrate(recording, SITE, load_imu("dtg"), extended_model("baseline", [f"own.yaml{part}"]))
+    write_result(tmp_path / "result.json", begun)
+    result = read_result(tmp_path / "result.json")
+    file = str(tmp_path / "own.yaml")
+    assert result.origin.effect_files == (file,)
+    added = added_to("baseline", result.model, result.origin.effect_files)
+    assert added == [file + part]
+    again = extended_model("baseline", added)
+    assert tuple(p.name for e in again.found for p in e.parameters) == names
+    assert without_file(result, again) == ""
+    with pytest.raises(DataError, match=f"it was read from {re.escape(file)}$"):
+        resolved(result)
+
+
+@pytest.mark.parametrize("left", ["", TWIN.replace("bent", "other")], ids=["gone", "changed"])
+def test_an_own_effect_without_its_file_is_told_and_not_added(write, tmp_path, left):
+    file = write(left) if left else tmp_path / "own.yaml"
+    names = tuple(q.name for e in extended_model("baseline", ()).effects for q in e.parameters)
+    result = SimpleNamespace(names=(*names, "bent_force_k"), origin=Origin(effect_files=(str(file),)))
+    added = added_to("baseline", (*load_model("baseline").effects, "bent_force_k"), result.origin.effect_files)
+    assert added == []
+    told = without_file(result, extended_model("baseline", added))
+    assert told.startswith(f"bent_force_k: in result.json, but not in what was diagnosed: {file}: gone, or changed")
 
 
 def test_what_a_model_has_is_not_added_twice():

@@ -39,6 +39,8 @@ class Origin:
     imu_file: str = ""
     site_file: str = ""
     """`imu_file`, `site_file`: paths of these files where the user named a path; empty for a name in config/."""
+    effect_files: tuple[str, ...] = ()
+    """Paths of the user's own effects in the model: their equations stand there alone."""
 
     def stated(self, serial: str | None, power_on: str | None) -> Origin:
         """Return it with what the user states; None leaves what the bag says."""

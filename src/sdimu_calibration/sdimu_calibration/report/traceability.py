@@ -49,6 +49,7 @@ def traceability(calibration: Calibration, trace: Trace | None) -> str:
         ("site", escape(origin.site)),
         ("estimator", escape(", ".join(w for w in (calibration.estimator, calibration.estimator_reason) if w))),
         ("model", escape(", ".join(calibration.model))),
+        ("own effects", "<br>".join(f"<code>{escape(file)}</code>" for file in origin.effect_files)),
         ("body frame", escape(calibration.body_frame)),
         *made,
     ]

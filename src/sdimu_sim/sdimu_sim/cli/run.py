@@ -326,6 +326,7 @@ def _watch(console: Console, children: Children, test: Outline, sigmas: dict[str
 
 def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibration:
     """Diagnose the bag, print the table with the truth, write diagnosis and page."""
+    from sdimu_calibration.cli.console import say
     from sdimu_calibration.cli.diagnosis_text import cost_lines, print_out_of_sight
     from sdimu_calibration.core.diagnosis.diagnose import climb
     from sdimu_calibration.core.diagnosis.summary import summarise
@@ -336,7 +337,7 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     from sdimu_calibration.report.table import rich_table, rows
     from sdimu_calibration.storage.files.config import load_imu
     from sdimu_calibration.storage.files.diagnosis_file import write_diagnosis
-    from sdimu_calibration.storage.files.effect_file import added_to, extended_model
+    from sdimu_calibration.storage.files.effect_file import added_to, extended_model, without_file
     from sdimu_calibration.storage.files.reference_file import read_reference, read_truth
     from sdimu_calibration.storage.files.result_file import read_result
     from sdimu_calibration.storage.opening import open_test
@@ -347,8 +348,9 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
     imu, model = test.imu, test.model
     with console.status("diagnosing") if console.is_terminal else nullcontext():
         opened = open_test(out / "bag", site, load_imu(imu))
-        added = added_to(model, result.model)
-        fit = solve(opened, extended_model(model, added))
+        added = added_to(model, result.model, result.origin.effect_files)
+        wanted = extended_model(model, added)
+        fit = solve(opened, wanted)
         diagnosis = climb(fit)
         summary, more = without_scolding(summarise(diagnosis), test.adaptive), report_extras(diagnosis, fit)
     fitted = Fitted(None if model == DEFAULT_MODEL else model, add=added or None)
@@ -373,6 +375,8 @@ def _report(console: Console, out: Path, site: str, test: LiveTest) -> Calibrati
         console.print(text, soft_wrap=True, highlight=False)
     print_out_of_sight(console, summary)
     print_advice(console, summary.advice, asked)
+    if lost := without_file(result, wanted):
+        say(console, f"note: {lost}")
     return result
 
 

@@ -19,6 +19,7 @@ from sdimu_calibration.core.note import Topic, topic_of
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.units import to_si
+from sdimu_calibration.storage.files.effect_file import extended_model
 from sdimu_calibration.storage.files.result_file import as_note
 from sdimu_sim.core.truth import ImuTruth
 from sdimu_study.score import baseline_z
@@ -54,6 +55,18 @@ def test_the_set_is_the_least_squares_of_all_rows(options):
     dense = unit * np.linalg.solve((J + np.diag(weight)) * np.outer(unit, unit), unit * d)
     sigma = np.sqrt(np.diag(fit.estimate.covariance))
     assert np.abs((dense - fit.estimate.values) / sigma).max() < 1e-4
+
+
+def test_the_result_of_a_set_names_the_files_of_its_own_effects(options, tmp_path):
+    file = tmp_path / "own.yaml"
+    file.write_text(
+        "format: sdimu-effect/1\nname: bent\nexpressions: {accel_x: k * ax**2}\n"
+        "parameters: {k: {unit: ug/g^2, prior: 30 ug/g^2}}\n"
+    )
+    own = replace(options, model=extended_model("baseline", [str(file)]))
+    result = set_outcome(fit_set(unit_set(5, [short()] * 2).members, own, here))
+    assert result.names[-1] == "bent_k"
+    assert result.origin.effect_files == (str(file),)
 
 
 def test_errors_of_a_set_are_those_its_sigmas_say(options):

@@ -119,7 +119,8 @@ def resolved(calibration: Calibration, own: Sequence[Effect] = ()) -> tuple[Effe
             [given[key] if key in given else selection.resolve(key) for key in calibration.model]
         )
     except DataError as error:
-        told = f"the result has an effect of no catalogue: {error}; name its file ({Option.EFFECT})"
+        files = "".join(f"; it was read from {file}" for file in calibration.origin.effect_files)
+        told = f"the result has an effect of no catalogue: {error}; name its file ({Option.EFFECT}){files}"
         raise DataError(told) from error
     names = tuple(parameter.name for effect in effects for parameter in effect.parameters)
     if names != calibration.names:

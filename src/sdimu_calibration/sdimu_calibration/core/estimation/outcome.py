@@ -75,7 +75,12 @@ def _origin(fit: Fit) -> Origin:
     recording = fit.test.recording
     out = measured(fit.test.origin, recording, fit.test.imu.name)
     let_go(recording.omega_ib_b, recording.f_ib_b)
-    return out
+    return replace(out, effect_files=effect_files(fit))
+
+
+def effect_files(fit: Fit) -> tuple[str, ...]:
+    """Paths of the files that effects of the model were read from."""
+    return tuple(dict.fromkeys(effect.file for effect in fit.sensors.effects if effect.file))
 
 
 def inseparable(names: Sequence[str], covariance: Floats) -> list[Note]:

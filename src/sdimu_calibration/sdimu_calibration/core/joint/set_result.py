@@ -14,7 +14,7 @@ from sdimu_calibration.core.estimation.fit import Fit
 from sdimu_calibration.core.estimation.fit_words import MISFIT
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.noise_estimate import not_of_sensors
-from sdimu_calibration.core.estimation.outcome import doubted, inseparable
+from sdimu_calibration.core.estimation.outcome import doubted, effect_files, inseparable
 from sdimu_calibration.core.estimation.prior_check import outside
 from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.handheld.run_scatter import scatter_in_words
@@ -158,6 +158,7 @@ def _origin(fit: SetFit, base: Fit) -> Origin:
         power_on="",
         recording="",
         start_ns=min(r.start_ns for r in fit.reports),
+        effect_files=effect_files(base),
         temperature_degc=float(mean),
         temperature_low_degc=float(np.fmin(low, own.temperature_low_degc)),
         temperature_high_degc=float(np.fmax(high, own.temperature_high_degc)),

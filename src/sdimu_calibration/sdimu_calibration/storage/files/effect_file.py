@@ -33,6 +33,7 @@ from sdimu_calibration.core.expression import (
     reciprocal_unit,
 )
 from sdimu_calibration.core.recording import DataError
+from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.core.units import UnitError, parse_unit
 from sdimu_calibration.storage.files.config import find_config, load_model
@@ -178,16 +179,45 @@ def extended_model(name: str, added: Sequence[str]) -> Model:
     return replace(model, effects=whole, found=whole[begun:])
 
 
-def added_to(name: str, effects: Sequence[str]) -> list[str]:
-    """Effects and equations in the model of a result that came to those it began with. `name`: that model."""
+def added_to(name: str, effects: Sequence[str], files: Sequence[str] = ()) -> list[str]:
+    """Effects, equations and files that came to the model with which a result began.
+
+    `name`: that model; `effects`: keys of all effects of the result; `files`: of the user's own among them
+    (`Origin.effect_files`). What no file has any more is left out: nothing else knows its equation.
+    """
     begun = {label for effect in extended_model(name, ()).effects for label in selection.resolve(effect).labels}
-    added = []
-    for text in effects:
-        # The name of an effect that a file of the user has is none that can be added.
+    own = _adding(files, effects)
+    added: dict[str, None] = {}
+    for key in effects:
         with suppress(DataError):
+            text = own.get(key, key)
             labels = {label for effect in find_effects(text) for label in effect.labels}
-            added += [] if labels <= begun else [text]
-    return added
+            added |= {} if labels <= begun else {text: None}
+    return list(added)
+
+
+def without_file(result: Calibration, model: Model) -> str:
+    """Say which coefficients of a result a model lacks, as no file has them any more (`added_to`); empty for none."""
+    has = {name for effect in model.effects for name in (p.name for p in selection.resolve(effect).parameters)}
+    lost = [name for name in result.names if name not in has]
+    if not lost:
+        return ""
+    return (
+        f"{', '.join(lost)}: in result.json, but not in what was diagnosed: {' '.join(result.origin.effect_files)}: "
+        "gone, or changed since; put it back, then run sdimu diagnose with --add"
+    )
+
+
+def _adding(files: Sequence[str], keys: Sequence[str]) -> dict[str, str]:
+    """Say by coefficient what adds it: its file where all coefficients of the file are among `keys`, or it alone."""
+    out: dict[str, str] = {}
+    for file in files:
+        with suppress(DataError):
+            effects = load_effect(Path(file))
+            whole = all(effect.name in keys for effect in effects)
+            names = {e.name: e.name.removeprefix(f"{e.family}_") for e in effects}
+            out |= {name: file if whole else f"{file}:{parameter}" for name, parameter in names.items()}
+    return out
 
 
 def _beside(folder: Path, text: str) -> str:

@@ -53,7 +53,7 @@ from sdimu_calibration.storage.files.result_model import (
 )
 
 FORMAT: Final = "sdimu-result/1"
-ORIGIN = Entry(seldom=("site_file", "imu_file"))
+ORIGIN = Entry(seldom=("site_file", "imu_file", "effect_files"))
 """How an origin stands in a file: with paths only where the user named them."""
 _ADVISES = re.compile(r"(.*)([;:,](?: or)? run:? sdimu diagnose)")
 """How a line of a file ends that advises a diagnosis."""
@@ -177,10 +177,13 @@ def write_result(path: Path, calibration: Calibration, verdict: Verdict | None =
         "rests": c.rests,
         "imu_noise": c.imu_noise and _noise_of(c.imu_noise),
     }
+    # From the root, so that they are found from any folder.
+    files = tuple(str(Path(file).resolve()) for file in c.origin.effect_files)
     ResultFile.model_construct(
         format=FORMAT,
         **{key: value for key, value in seldom.items() if value},
-        **entry(c, "origin estimator estimator_reason body_frame model covariance noise history"),
+        origin=replace(c.origin, effect_files=files),
+        **entry(c, "estimator estimator_reason body_frame model covariance noise history"),
         drift_means=dict(c.drift_means),
         coefficients=_coefficients(c),
         fit=dict(c.fit),
