@@ -14,7 +14,11 @@ from plans import hidden_recording, with_angles
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, diagnose
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.recording import Recording
+from sdimu_calibration.report.coefficients import grouped_table
+from sdimu_calibration.report.design.sheet import document
+from sdimu_calibration.report.markup import section
 from sdimu_calibration.report.page import write_report
+from sdimu_calibration.report.table import Row
 from sdimu_calibration.storage.files.config import load_imu, load_model, load_plan, load_site
 
 from .conftest import broken_rules, crossing_labels
@@ -225,6 +229,25 @@ def test_gyros_stand_beside_accelerometers(browser: Any, report: Path, width: in
     page.close()
     assert boxes[0][0] == boxes[1][0]
     assert [over for _, over in boxes] == [0, 0]
+
+
+@pytest.mark.parametrize("width", [800, 1100, 1199, 1200])
+def test_coefficients_beside_prior_truth_and_published_sigma_fit_their_card(
+    browser: Any, tmp_path: Path, width: int
+) -> None:
+    shown = {"sigma": 0.0045, "truth": -20.48, "error": -0.0012, "error_sigmas": -1.23, "reference": 0.028}
+    rows = [
+        Row(f"{effect}_yx", effect, unit, -20.49, prior=1.41, **shown)
+        for effect, unit in (("gyro_mass_unbalance", "deg/h/g"), ("accel_misalignment", "arcmin"))
+    ]
+    path = tmp_path / "page.html"
+    card = section("Coefficients", grouped_table(rows))
+    path.write_text(document("Coefficients", card, contents=[("coefficients", card.heading)]), encoding="utf-8")
+    page = browser.new_page(viewport={"width": width, "height": 800})
+    page.goto(path.as_uri())
+    over = page.evaluate("[...document.querySelectorAll('.wide')].map(e => e.scrollWidth - e.clientWidth)")
+    page.close()
+    assert over == [0, 0]
 
 
 def test_the_buttons_of_a_map_cover_none_of_its_cells(opened: Any) -> None:

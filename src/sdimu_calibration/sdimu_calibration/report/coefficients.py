@@ -93,7 +93,8 @@ def grouped_table(entries: Sequence[table.Row]) -> str:
     """Return the coefficients, those of the gyros beside those of the accelerometers; a heading for each effect."""
     columns = table.headings(list(entries))
     kinds = [' class="text"' if column in _TEXT else "" for column in columns]
-    head = "".join(f'<th scope="col"{kind}>{escape(c)}</th>' for c, kind in zip(columns, kinds, strict=True))
+    heads = [escape(column).replace("/", "/<wbr>") for column in columns]
+    head = "".join(f'<th scope="col"{kind}>{word}</th>' for word, kind in zip(heads, kinds, strict=True))
     effects: dict[str, list[table.Row]] = {}
     for row in entries:
         effects.setdefault(row.effect, []).append(row)
