@@ -33,17 +33,20 @@ def test_the_fleet_draws_and_sorts_by_the_heading_that_is_clicked(batch, opened)
     opened.goto(f"file://{folder / 'fleet.html'}")
     opened.evaluate("sdimuDrawAll()")
     assert opened.locator(".js-plotly-plot").count() >= 5
-    heading = opened.locator("thead th", has_text="spread").first
+    # Numbers with a sign of print, too.
+    heading = opened.locator("thead th", has_text="mean").first
     heading.click()
     column = opened.evaluate("head => Array.from(head.parentNode.children).indexOf(head)", heading.element_handle())
     table = opened.locator("table").first
 
     def shown() -> list[float]:
         rows = table.locator("tbody tr")
-        return [float(rows.nth(k).locator("td").nth(column).inner_text()) for k in range(rows.count())]
+        texts = [rows.nth(k).locator("td").nth(column).inner_text() for k in range(rows.count())]
+        return [float(text.replace("\N{MINUS SIGN}", "-")) for text in texts]
 
     rising = shown()
     assert rising == sorted(rising)
+    assert rising[0] < 0.0 < rising[-1]
     assert heading.get_attribute("aria-sort") == "ascending"
     heading.click()
     assert shown() == rising[::-1]

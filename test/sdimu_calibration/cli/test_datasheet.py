@@ -94,6 +94,9 @@ def test_the_title_names_the_serial_number_and_calls_no_folder_one(batch):
     page = (alone / "datasheet.html").read_text()
     assert "<h1>Calibration certificate: dtg, unit unit2_0 (no serial stated)</h1>" in page
     assert json.loads((alone / "datasheet.json").read_text())["serial"] == ""
+    # Its coefficients have the sign of print, as in the report.
+    assert re.search(r"<td>\N{MINUS SIGN}[\d.]+</td>", page)
+    assert not re.search(r">-\.?\d", page)
 
 
 def test_the_certificate_is_of_one_unit_with_the_hashes_of_its_recordings(batch, tmp_path, capsys):

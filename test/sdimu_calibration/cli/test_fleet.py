@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,9 @@ def test_the_unit_that_is_out_is_named_and_the_files_say_the_same(batch, capsys,
     page = (tmp_path / "pages" / "fleet.html").read_text()
     assert "SN4 is out" in page
     assert page.count('class="figure"') >= 5
+    # Numbers have the sign of print on the page, that of programs in the file.
+    assert re.search(r"<td>\N{MINUS SIGN}[\d.]+</td>", page)
+    assert not re.search(r">-\.?\d", page)
 
 
 def test_a_clean_fleet_has_nobody_out(batch, capsys):

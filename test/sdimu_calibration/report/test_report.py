@@ -32,7 +32,7 @@ from sdimu_calibration.report.coefficients import as_csv, as_yaml, grouped_table
 from sdimu_calibration.report.cost import in_use, in_use_entry, metres
 from sdimu_calibration.report.evidence_figures import heat_maps
 from sdimu_calibration.report.first_screen import ladder_strip
-from sdimu_calibration.report.markup import prose, section, signs
+from sdimu_calibration.report.markup import grid, prose, section, signs
 from sdimu_calibration.report.may_be import MayBe, classes_of
 from sdimu_calibration.report.page import Contents, page
 from sdimu_calibration.report.report_extras import ReportExtras, report_extras
@@ -376,6 +376,12 @@ def test_a_hyphen_that_begins_no_number_stays(text):
 @pytest.mark.parametrize("text", ["-9.1 sigma", "turn X -180 deg", "gyro_bias_y (-3.0 deg/h)", "by -.5 ug"])
 def test_a_hyphen_that_begins_a_number_is_a_sign_of_minus(text):
     assert signs(text) == text.replace("-", "\N{MINUS SIGN}")
+
+
+def test_numbers_of_a_grid_have_the_sign_of_print_and_words_are_as_they_are():
+    table = grid(("unit -1", "mean"), [["unit -1", "-0.5"]], {0})
+    assert '<th class="text">unit -1</th>' in table
+    assert '<td class="text">unit -1</td><td>\N{MINUS SIGN}0.5</td>' in table
 
 
 def test_sizes_of_the_table_of_probabilities_have_one_sign_of_minus(diagnosis):

@@ -82,15 +82,13 @@ def sentence(text: str) -> str:
 
 
 def grid(columns: Sequence[str], rows: Sequence[Sequence[str]], text: set[int]) -> str:
-    """Return an HTML table; the columns in `text` are flush left."""
+    """Return an HTML table; the columns in `text` are flush left, the others are numbers with the signs of print."""
+
+    def cell(tag: str, k: int, word: str) -> str:
+        return f'<{tag} class="text">{escape(word)}</{tag}>' if k in text else f"<{tag}>{escape(signs(word))}</{tag}>"
 
     def line(tag: str, words: Sequence[str]) -> str:
-        kinds = (' class="text"' if k in text else "" for k in range(len(words)))
-        return (
-            "<tr>"
-            + "".join(f"<{tag}{kind}>{escape(word)}</{tag}>" for word, kind in zip(words, kinds, strict=True))
-            + "</tr>"
-        )
+        return f"<tr>{''.join(cell(tag, k, word) for k, word in enumerate(words))}</tr>"
 
     body = "".join(line("td", row) for row in rows)
     return f'<div class="wide"><table><thead>{line("th", columns)}</thead><tbody>{body}</tbody></table></div>'

@@ -14,7 +14,7 @@ from sdimu_calibration.report.fleet import tables
 from sdimu_calibration.report.fleet.dots import dot_plot
 from sdimu_calibration.report.fleet.figures import control_chart, heat_map
 from sdimu_calibration.report.groups import title as words_of
-from sdimu_calibration.report.markup import grid, prose, quiet, section
+from sdimu_calibration.report.markup import grid, prose, quiet, section, signs
 from sdimu_calibration.storage.files.fleet_folder import Gathered
 from sdimu_calibration.storage.files.whole_file import write_whole
 
@@ -23,7 +23,7 @@ _MOST_COMMON, _MOST_TRENDS = 12, 12
 _SORT = """
 document.querySelectorAll('table').forEach(function (table) {
   var heads = table.querySelectorAll('thead th'), body = table.querySelector('tbody');
-  function value(row, k) { return row.children[k].textContent.replace('<', ''); }
+  function value(row, k) { return row.children[k].textContent.replace('<', '').replace('\\u2212', '-'); }
   heads.forEach(function (head, k) {
     head.tabIndex = 0; head.style.cursor = 'pointer'; head.title = 'sort';
     function sort() {
@@ -62,7 +62,7 @@ def write_page(path: Path, gathered: Gathered, done: Study, candidates: Candidat
     """Write fleet.html. `candidates`: for their units; `title`: heading of the page."""
     units = display_units(gathered, candidates)
     kind = "bad" if done.people.out else "good"
-    sentences = "<br>".join(prose(one) for one in tables.sentences(done, units))
+    sentences = "<br>".join(prose(signs(one)) for one in tables.sentences(done, units))
     told = f'<div class="verdict {kind}">{sentences}</div>'
     parts = [
         section(

@@ -14,7 +14,7 @@ from sdimu_calibration.core.plain_text import first_of
 from sdimu_calibration.core.units import from_si
 from sdimu_calibration.report.design.sheet import document
 from sdimu_calibration.report.fleet.tables import three
-from sdimu_calibration.report.markup import grid, prose, quiet, section
+from sdimu_calibration.report.markup import grid, prose, quiet, section, signs
 from sdimu_calibration.report.table import cells
 from sdimu_calibration.report.table import rows as coefficient_rows
 from sdimu_calibration.storage.files.datasheet_file import Certificate
@@ -141,7 +141,7 @@ def against_limit(line: Line) -> str:
 def _limit(line: Line) -> str:
     """Return an item of the list of limits."""
     kind = line.verdict.split(" ")[0]
-    return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(against_limit(line))}</li>'
+    return f'<li><b class="{kind}">{escape(line.verdict)}</b> {escape(signs(against_limit(line)))}</li>'
 
 
 _JUDGED = ("limit", "verdict")
@@ -189,7 +189,7 @@ def _line(line: Line, triad: str, judged: bool) -> str:
         *([(limit, "number"), (verdict, f"text {verdict.split(' ')[0]}")] if judged else []),
         (how, "text quiet"),
     ]
-    return "<tr>" + "".join(f'<td class="{kind}">{escape(text)}</td>' for text, kind in texts) + "</tr>"
+    return "<tr>" + "".join(f'<td class="{kind}">{escape(signs(text))}</td>' for text, kind in texts) + "</tr>"
 
 
 def _missing(lines: Sequence[Line]) -> str:
