@@ -34,8 +34,6 @@ LONG: dict[Place, str] = {
     ("sdimu_calibration/core/joint/set_search.py", "search_set"): "not yet split: the search is being designed anew",
     ("sdimu_calibration/core/filter/filter_pass.py", "run_pass"): "compiled: one loop",
     ("sdimu_calibration/core/navigation/strapdown.py", "_reduce"): "compiled: one loop",
-    ("launch/driver_launch.py", "generate_launch_description"): "a list of nodes and arguments",
-    ("launch/simulation_launch.py", "generate_launch_description"): "a list of nodes and arguments",
 }
 """Functions with more lines, and why."""
 

@@ -46,70 +46,73 @@ def argument(name, kind=str):
     return ParameterValue(LaunchConfiguration(name), value_type=kind)
 
 
+def declared():
+    """Return all arguments with their defaults."""
+    return [DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS]
+
+
+def remapped(topics):
+    """Put yours, by the argument that names it, in the place of each topic of a node."""
+    return [(own, LaunchConfiguration(name)) for own, name in topics.items()]
+
+
+def reading():
+    """Parameters by which samples are opened: topics, IMU, site, model, units and signs."""
+    texts = ("imu_topic", "status_topic", "temperature_topic", "imu", "site", "model", "accel_unit", "gyro_unit")
+    signs = {name: argument(name, int) for name in ("accel_sign", "gyro_sign")}
+    return {name: argument(name) for name in texts} | signs
+
+
+def node(executable, name, parameters, remappings=(), condition=None):
+    """Return a node of this package in the namespace of all."""
+    return Node(
+        package="sdimu_calibration",
+        executable=executable,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[parameters],
+        remappings=list(remappings),
+        output="screen",
+        condition=condition,
+    )
+
+
+def calibrating():
+    """Calibrate until the program is ended."""
+    kept = {"out": LaunchConfiguration("out"), "stay": True, "report": True, "diagnose": argument("diagnose", bool)}
+    return node("calibration_node", "calibration", reading() | kept)
+
+
+def recording():
+    """Record what the calibration reads, and the angles of the table."""
+    topics = {
+        "imu/data_raw": "imu_topic",
+        "rate_table/status": "status_topic",
+        "imu/temperature": "temperature_topic",
+        "rate_table/joint_states": "joint_states",
+    }
+    bag = PathJoinSubstitution([LaunchConfiguration("out"), "bag"])
+    return node("recorder_node", "recorder", {"out": bag}, remapped(topics))
+
+
+def driving(executable, way, parameters):
+    """Drive the table that is named, in one of the two ways of the argument `drive`."""
+    table, drive = LaunchConfiguration("table"), LaunchConfiguration("drive")
+    asked = IfCondition(PythonExpression(["'", table, "' != '' and '", drive, f"' == '{way}'"]))
+    common = {"table": argument("table"), "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool)}
+    topics = {"rate_table/joint_states": "joint_states", "rate_table/joint_trajectory": "joint_trajectory"}
+    return node(executable, executable, common | parameters, remapped(topics), asked)
+
+
 def generate_launch_description():
     """Declare the arguments and start calibration and recorder, and what drives a table when one is named."""
-    namespace, out = LaunchConfiguration("namespace"), LaunchConfiguration("out")
-    opened = ("imu_topic", "status_topic", "temperature_topic", "imu", "site", "model", "accel_unit", "gyro_unit")
-
-    reading = {name: argument(name) for name in opened}
-    reading |= {name: argument(name, int) for name in ("accel_sign", "gyro_sign")}
-
-    def driven(way):
-        table, drive = LaunchConfiguration("table"), LaunchConfiguration("drive")
-        return IfCondition(PythonExpression(["'", table, "' != '' and '", drive, f"' == '{way}'"]))
-
-    driving = {"table": argument("table"), "allow_motion": argument("allow_motion", bool), "ask": argument("ask", bool)}
-    joints = ("rate_table/joint_states", LaunchConfiguration("joint_states"))
-    trajectory = ("rate_table/joint_trajectory", LaunchConfiguration("joint_trajectory"))
-    samples = [
-        ("imu/data_raw", LaunchConfiguration("imu_topic")),
-        ("rate_table/status", LaunchConfiguration("status_topic")),
-        ("imu/temperature", LaunchConfiguration("temperature_topic")),
-    ]
+    goals = {"goals": argument("goals"), "out": LaunchConfiguration("out")}
     return LaunchDescription(
         [
-            *(
-                DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, default, text in ARGUMENTS
-            ),
-            Node(
-                package="sdimu_calibration",
-                executable="calibration_node",
-                name="calibration",
-                namespace=namespace,
-                parameters=[
-                    reading | {"out": out, "stay": True, "report": True, "diagnose": argument("diagnose", bool)}
-                ],
-                output="screen",
-            ),
-            Node(
-                package="sdimu_calibration",
-                executable="recorder_node",
-                name="recorder",
-                namespace=namespace,
-                parameters=[{"out": PathJoinSubstitution([out, "bag"])}],
-                remappings=[*samples, joints],
-                output="screen",
-            ),
-            Node(
-                package="sdimu_calibration",
-                executable="table_goals",
-                name="table_goals",
-                namespace=namespace,
-                parameters=[driving | {"plan": argument("plan")}],
-                remappings=[joints, trajectory],
-                output="screen",
-                condition=driven("plan"),
-            ),
-            Node(
-                package="sdimu_calibration",
-                executable="adaptive",
-                name="adaptive",
-                namespace=namespace,
-                parameters=[driving | reading | {"goals": argument("goals"), "out": out}],
-                remappings=[joints, trajectory],
-                output="screen",
-                condition=driven("adaptive"),
-            ),
+            *declared(),
+            calibrating(),
+            recording(),
+            driving("table_goals", "plan", {"plan": argument("plan")}),
+            driving("adaptive", "adaptive", reading() | goals),
         ]
     )

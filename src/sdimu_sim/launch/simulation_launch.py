@@ -44,21 +44,63 @@ def ended(event, _):
     return [Shutdown(reason=f"{event.process_name} has failed")] if event.returncode else []
 
 
-def generate_launch_description():
-    """Declare the arguments and start the nodes; each waits for those it feeds."""
-    out, namespace = LaunchConfiguration("out"), LaunchConfiguration("namespace")
+def declared():
+    """Return all arguments with their defaults."""
+    return [DeclareLaunchArgument(name, default_value=default, description=text) for name, default, text in ARGUMENTS]
 
-    def node(package, executable, name, parameters, condition=None):
-        return Node(
-            package=package,
-            executable=executable,
-            name=name,
-            namespace=namespace,
-            parameters=[parameters],
-            output="screen",
-            condition=condition,
-        )
 
+def node(package, executable, name, parameters, *ways):
+    """Return a node in the namespace of all; with `ways` only where the argument `drive` is one of them."""
+    drive = LaunchConfiguration("drive")
+    return Node(
+        package=package,
+        executable=executable,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[parameters],
+        output="screen",
+        condition=IfCondition(PythonExpression(["'", drive, "' in ", repr(ways)])) if ways else None,
+    )
+
+
+def estimating():
+    """Parameters of whoever fits the samples: of the simulated gyros unit and sign are known."""
+    return {
+        "site": argument("site"),
+        "imu": argument("imu"),
+        "model": argument("model"),
+        "out": LaunchConfiguration("out"),
+        "gyro_unit": "rad/s",
+        "gyro_sign": 1,
+    }
+
+
+def observers():
+    """Record and calibrate."""
+    bag = PathJoinSubstitution([LaunchConfiguration("out"), "bag"])
+    awaited = ["imu/data_raw", "rate_table/status", "calibration/coefficients"]
+    return [
+        node("sdimu_calibration", "recorder_node", "recorder", {"out": bag, "wait_for": awaited}),
+        node("sdimu_calibration", "calibration_node", "calibration", estimating() | {"report": True}),
+    ]
+
+
+def simulated_imu():
+    """Simulate the IMU on the table; its truth goes beside the results."""
+    sampling = {
+        "imu": argument("imu"),
+        "site": argument("site"),
+        "plan": argument("plan"),
+        "seed": argument("seed", int),
+        "rate_hz": argument("rate_hz", float),
+        "truth_file": PathJoinSubstitution([LaunchConfiguration("out"), "truth.yaml"]),
+        "consumers": 2,
+    }
+    return node("sdimu_sim", "sdimu_node", "sdimu", sampling)
+
+
+def simulated_tables():
+    """Simulate the table: one that plays the plan, or one that follows trajectories."""
     table = {
         "plan": argument("plan"),
         "table": argument("table"),
@@ -68,87 +110,29 @@ def generate_launch_description():
         "status_peers": 2,
         "joint_peers": 1,
     }
+    following = table | {"follow_goals": True}
+    return [
+        node("rate_table_sim", "rate_table_node", "rate_table", table, ""),
+        node("rate_table_sim", "rate_table_node", "rate_table", following, "plan", "adaptive"),
+    ]
 
-    def driven(*ways):
-        drive = LaunchConfiguration("drive")
-        return IfCondition(PythonExpression(["'", drive, "' in ", repr(ways)]))
 
+def drivers():
+    """Send trajectories: those of the plan, or those of turns that the test chooses."""
     driving = {
         "table": argument("table"),
         "finish": True,
         "allow_motion": argument("allow_motion", bool),
         "ask": argument("ask", bool),
     }
-    return LaunchDescription(
-        [
-            *(
-                DeclareLaunchArgument(name, default_value=default, description=text)
-                for name, default, text in ARGUMENTS
-            ),
-            RegisterEventHandler(OnProcessExit(on_exit=ended)),
-            node(
-                "sdimu_calibration",
-                "recorder_node",
-                "recorder",
-                {
-                    "out": PathJoinSubstitution([out, "bag"]),
-                    "wait_for": ["imu/data_raw", "rate_table/status", "calibration/coefficients"],
-                },
-            ),
-            node(
-                "sdimu_calibration",
-                "calibration_node",
-                "calibration",
-                {
-                    "site": argument("site"),
-                    "imu": argument("imu"),
-                    "model": argument("model"),
-                    "out": out,
-                    "gyro_unit": "rad/s",
-                    "gyro_sign": 1,
-                    "report": True,
-                },
-            ),
-            node(
-                "sdimu_sim",
-                "sdimu_node",
-                "sdimu",
-                {
-                    "imu": argument("imu"),
-                    "site": argument("site"),
-                    "plan": argument("plan"),
-                    "seed": argument("seed", int),
-                    "rate_hz": argument("rate_hz", float),
-                    "truth_file": PathJoinSubstitution([out, "truth.yaml"]),
-                    "consumers": 2,
-                },
-            ),
-            node("rate_table_sim", "rate_table_node", "rate_table", table, driven("")),
-            node(
-                "rate_table_sim",
-                "rate_table_node",
-                "rate_table",
-                table | {"follow_goals": True},
-                driven("plan", "adaptive"),
-            ),
-            node(
-                "sdimu_calibration", "table_goals", "table_goals", driving | {"plan": argument("plan")}, driven("plan")
-            ),
-            node(
-                "sdimu_calibration",
-                "adaptive",
-                "adaptive",
-                driving
-                | {
-                    "imu": argument("imu"),
-                    "site": argument("site"),
-                    "model": argument("model"),
-                    "goals": argument("goals"),
-                    "gyro_unit": "rad/s",
-                    "gyro_sign": 1,
-                    "out": out,
-                },
-                driven("adaptive"),
-            ),
-        ]
-    )
+    planned, chosen = {"plan": argument("plan")}, estimating() | {"goals": argument("goals")}
+    return [
+        node("sdimu_calibration", "table_goals", "table_goals", driving | planned, "plan"),
+        node("sdimu_calibration", "adaptive", "adaptive", driving | chosen, "adaptive"),
+    ]
+
+
+def generate_launch_description():
+    """Declare the arguments and start the nodes; each waits for those it feeds."""
+    ending = RegisterEventHandler(OnProcessExit(on_exit=ended))
+    return LaunchDescription([*declared(), ending, *observers(), simulated_imu(), *simulated_tables(), *drivers()])
