@@ -9,7 +9,7 @@ import pytest
 
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint import near_equations
-from sdimu_calibration.core.joint.equation_share import EquationShare, equation_share, force_equations
+from sdimu_calibration.core.joint.equation_share import EquationShare, equation_share, single_equations
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.verdict import Verdict
 
@@ -53,7 +53,7 @@ def test_the_share_of_a_recording_is_what_its_evidence_says_of_an_equation(test_
     """Beside everything that the recording estimates the equation gains what a scan of it gains."""
     fit = solve(test_of_one, options.model)
     share = equation_share(fit, ("accel_scale_x",))
-    effect = next(e for e in force_equations(False) if e.labels == (HIDDEN,))
+    effect = next(e for e in single_equations(False) if e.labels == (HIDDEN,))
     evidence = fit.evidence([effect])
     assert not fit.noise_terms
     J, d = evidence.information.diagonal_given(evidence.model, evidence.weight)

@@ -45,8 +45,8 @@ class EquationShare:
     """`d_told`, `d`: shapes (t,) and (n,). Pull about the fit (1/SI)."""
 
 
-def force_equations(has_temperature: bool) -> list[Effect]:
-    """Equations of one parameter each, in the order of `candidates.equations`."""
+def single_equations(has_temperature: bool) -> list[Effect]:
+    """Every equation of `candidates.equations`, of one parameter each."""
     return [one for effect in equations(has_temperature) for one in effect.singles]
 
 
@@ -64,7 +64,7 @@ def equation_share(fit: Fit, told: Sequence[str]) -> EquationShare:
     evidence = fit.bare.in_inner(wander.inner)
     board, noise = Board(evidence, np.empty(0, np.int64), frozenset(), wander), NoiseModel(tuple(fit.noise_terms))
     one, p = board.in_noise(noise), len(evidence.weight)
-    effects = force_equations(fit.has_temperature)
+    effects = single_equations(fit.has_temperature)
     blocks = [effects[k : k + _BLOCK] for k in range(0, len(effects), _BLOCK)]
     seen = [board.seen_of(evidence.signature(block), np.arange(p), noise) for block in blocks]
     own, across, d = (np.concatenate(parts) for parts in zip(*seen, strict=True))

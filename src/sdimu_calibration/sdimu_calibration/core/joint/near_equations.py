@@ -18,7 +18,7 @@ from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.testable import TESTABLE
-from sdimu_calibration.core.joint.equation_share import EquationShare, force_equations
+from sdimu_calibration.core.joint.equation_share import EquationShare, single_equations
 from sdimu_calibration.core.joint.set_fit import Run, SetOptions, job_of
 from sdimu_calibration.core.joint.set_found import SetSearch
 from sdimu_calibration.core.joint.set_search import place_of
@@ -65,7 +65,7 @@ def near_equations(found: SetSearch, run: Run) -> tuple[Effect, ...]:
     all_ = _together(shares)
     gain = gains_in_place(all_, fit.estimate.values[at], fit.weight[at])
     order = np.argsort(-gain, kind="stable")[:_MOST]
-    known = {effect.labels[0]: effect for effect in force_equations(has_temperature=True)}
+    known = {effect.labels[0]: effect for effect in single_equations(has_temperature=True)}
     return tuple(known[all_.labels[k]] for k in order.tolist() if gain[k] > _LEAST)
 
 
