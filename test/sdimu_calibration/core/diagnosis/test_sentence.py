@@ -85,10 +85,14 @@ def test_shares_beyond_all_are_said_to_be_of_two_that_may_be_there(summary):
 
 def test_an_equation_that_fits_is_not_called_certain_physics(summary):
     told = with_shares(summary, 0.999, (own(summary), 0.999))
-    d = replace(told.diagnosis, own=True, verdict=Verdict.OWN_EQUATION)
-    begun = "No effect of the catalogue fits, an equation does. Missing for certain, and fitted by: accelerometer"
-    assert sentence(d, told.found).startswith(begun)
-    assert sentence(replace(d, own=False, verdict=Verdict.ONE_EFFECT), told.found).startswith("Certain: accelerometer")
+    d, one = replace(told.diagnosis, own=True, verdict=Verdict.OWN_EQUATION), told.found[0]
+    equation = replace(one, candidate=replace(one.candidate, family="own"))
+    begun = "No effect of the catalogue fits, an equation does. Missing for certain, and fitted by: accel_quadratic_x ("
+    assert sentence(d, [equation]).startswith(begun)
+    assert sentence(replace(d, own=False, verdict=Verdict.ONE_EFFECT), [one]).startswith("Certain: accelerometer")
+    both = sentence(d, [one, equation])
+    assert both.startswith("Certain: accelerometer second-order")
+    assert "). No effect of the catalogue fits what is left, an equation does. Missing for certain, and" in both
 
 
 @pytest.mark.parametrize(("kind", "left"), [(STOP, "What is left looks like"), (ATTITUDE, "What is left is the accel")])
@@ -103,8 +107,9 @@ def test_what_is_found_beside_what_is_unexplained_has_its_grade(summary, kind, l
     alone = with_shares(summary, 0.999, (own(summary), 0.999))
     assert sentence(d, alone.found).startswith("Certain: accelerometer")
     assert sentence(d, alone.found, held=False).startswith("In what was fitted, but not beyond it: accelerometer")
-    equation = sentence(replace(d, own=True), alone.found)
-    assert equation.startswith("Missing for certain, and fitted by: accelerometer")
+    one = alone.found[0]
+    equation = sentence(replace(d, own=True), [replace(one, candidate=replace(one.candidate, family="own"))])
+    assert equation.startswith("Missing for certain, and fitted by: accel_quadratic_x (")
 
 
 def test_what_fails_where_it_was_not_fitted_is_not_called_certain_nor_to_be_trusted(summary, monkeypatch):

@@ -44,6 +44,8 @@ class Graded:
     """What it may be, the likeliest first; one alone, or none, where it is told which."""
     family: str = ""
     """What all of these are alike in, in words; empty where their names say it."""
+    is_equation: bool = False
+    """It is an equation that no physics names."""
 
     @property
     def certain(self) -> bool:
@@ -64,7 +66,8 @@ def graded(found: Iterable[Found], told: Probabilities | None) -> tuple[Graded, 
     for one in every:
         probability, shares = _grade(one, told, named)
         family = _family(one, shares, told)
-        out.append(Graded(_sized(one), one.candidate.coefficient, size_of(one), probability, shares, family))
+        words, size_, own = _sized(one), size_of(one), one.candidate.family == "own"
+        out.append(Graded(words, one.candidate.coefficient, size_, probability, shares, family, own))
     return tuple(out)
 
 

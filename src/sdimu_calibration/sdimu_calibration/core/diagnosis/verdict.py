@@ -41,10 +41,12 @@ _COLOURED = 1.2
 minutes."""
 _ROUNDING = 1e-6
 """Size of a learned sigma (customary unit) up to which it is written as zero: rounding leaves as much."""
-FITTED_BY = "Missing for certain, and fitted by"
+_FITTED_BY = "Missing for certain, and fitted by"
 """What is said of equations in the place of ``Certain``."""
 
-NONE_FITS = "No effect of the catalogue fits, an equation does."
+_ALONE = "No effect of the catalogue fits, an equation does."
+_LEFT = "No effect of the catalogue fits what is left, an equation does."
+"""`_ALONE`, `_LEFT`: what is said before equations, alone and behind effects."""
 IF_NONE = "as noise, and may be too small if it is none"
 """What is said of sigmas that hold something unexplained."""
 _FITTED = "In what was fitted, but not beyond it"
@@ -111,14 +113,30 @@ def statements(d: Diagnosis, found: Sequence[Found], held: bool = True) -> tuple
         grave = [f.text for f in d.findings if f.grave]
         return (f"The data have a fault: {'; '.join(grave)}." if grave else _of_recording(d, found),)
     every = _graded(d, [one for one in found if not _is_fault(one)])
-    firm = (FITTED_BY if d.own else "Certain") if held else _FITTED
-    told = tuple(text for text in (*each_grade(every, firm), _of_recording(d, found)) if text)
+    faults = tuple(text for text in (_of_recording(d, found),) if text)
     if d.verdict == Verdict.UNEXPLAINED:
-        return _unexplained(d, told)
+        return _unexplained(d, (*each_kind(every, held, lead=False), *faults))
     if not d.chosen and d.probabilities is not None:
         return (something_missing(d.probabilities),)
-    # That an equation fits does not say that it is the physics: others that were not tried may fit as well.
-    return (NONE_FITS, *told) if d.own else told
+    return (*each_kind(every, held), *faults)
+
+
+def each_kind(every: Sequence[Graded], held: bool = True, lead: bool = True) -> tuple[str, ...]:
+    """Say what was found, a statement a grade: effects of the catalogue, then equations that no physics names.
+
+    That an equation fits does not say that it is the physics: others that were not tried may fit as well.
+
+    Parameters
+    ----------
+    held : bool
+        Whether it holds where it was not fitted; False: nothing of it is called certain.
+    lead : bool
+        Say before equations that no effect fits.
+    """
+    effects = each_grade([one for one in every if not one.is_equation], "Certain" if held else _FITTED)
+    equations = each_grade([one for one in every if one.is_equation], _FITTED_BY if held else _FITTED)
+    before = (_LEFT if effects else _ALONE,) if equations and lead else ()
+    return (*effects, *before, *equations)
 
 
 def _of_recording(d: Diagnosis, found: Sequence[Found]) -> str:

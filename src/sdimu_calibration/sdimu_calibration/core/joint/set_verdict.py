@@ -9,12 +9,11 @@ import numpy as np
 
 from sdimu_calibration.core.diagnosis.alarms import STILL_WRONG
 from sdimu_calibration.core.diagnosis.found import DECIDED
-from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, each_grade, named, size, without_variant
+from sdimu_calibration.core.diagnosis.grades import LISTED, NAMED, Graded, named, size, without_variant
 from sdimu_calibration.core.diagnosis.verdict import (
-    FITTED_BY,
     IF_NONE,
-    NONE_FITS,
     Facts,
+    each_kind,
     nothing_missing,
     something_missing,
     verdict,
@@ -159,14 +158,14 @@ def _found(word: Verdict, facts: SetFacts) -> tuple[str, ...]:
         return (f"The model explains all recordings together{mark} {how}{nothing_missing(told)}.",)
     if word == Verdict.DATA_FAULT:
         return (_of_recordings(findings), *_of_each(facts))
-    every = each_grade(list(map(_graded, findings)), FITTED_BY if facts.own else "Certain") if findings else ()
+    every = list(map(_graded, findings))
     if word == Verdict.UNEXPLAINED:
         odd = () if facts.beside_function else _odd(facts.after)
         shared = facts.beside_function or (facts.comes_back and not odd)
         what = "The recordings share something" if shared else "Something differs between the recordings"
-        beside = ("Found beside it:", *every) if every else ()
+        beside = ("Found beside it:", *each_kind(every, lead=False)) if every else ()
         return (f"{what} that no effect of the catalogue explains.", *beside, *odd, *_of_each(facts))
-    return (NONE_FITS, *every) if facts.own else every
+    return each_kind(every)
 
 
 def _of_recordings(findings: Sequence[SetFinding]) -> str:
@@ -204,7 +203,8 @@ def _some(names: Sequence[str]) -> str:
 def _graded(f: SetFinding) -> Graded:
     # Of what is of one recording alone the class is not told: what happened there is to be found out.
     shares = () if f.recording else tuple(share for share in f.may_be if share.probability >= NAMED)
-    return Graded(_named(f), without_variant(f.label), size(f.value, f.sigma, f.display_unit), f.probability, shares)
+    words, size_, own = _named(f), size(f.value, f.sigma, f.display_unit), f.family == "own"
+    return Graded(words, without_variant(f.label), size_, f.probability, shares, is_equation=own)
 
 
 def _many_changed(changed: Sequence[SetFinding]) -> str:
