@@ -12,7 +12,7 @@ from sdimu_calibration.cli.diagnosis_text import candidate_rows
 from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.advice import advice, handheld_advice
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis, _beside_wrong_prior
-from sdimu_calibration.core.diagnosis.grades import graded, in_grades, named, size_of
+from sdimu_calibration.core.diagnosis.grades import Graded, each_grade, graded, in_grades, named, size_of
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.diagnosis.verdict import Facts, something_missing, statements, verdict
@@ -311,8 +311,16 @@ def test_what_is_likely_says_how_likely(summary):
 
 
 def test_what_is_not_probable_enough_to_be_named_leaves_nothing_open(summary):
+    """What is named is as sure as it is itself: that one of its class is certain says less."""
     told = said(with_shares(summary, 0.999, (own(summary), 0.97), ("accel_cubic_x", 0.03)))
-    assert told.startswith("Certain: ")
+    assert told.startswith("Likely (97 %): accelerometer second-order")
+    assert said(with_shares(summary, 0.999, (own(summary), 0.995))).startswith("Certain: ")
+
+
+def test_what_a_sentence_has_no_room_for_is_counted():
+    more = [Graded(f"effect {k}", f"e{k}", "1 ug", 0.9) for k in range(6)]
+    assert each_grade(more[:5])[-1] == "1 more is in the table."
+    assert each_grade(more)[-1] == "2 more are in the table."
 
 
 def test_the_sentence_has_no_error_of_another_place(summary):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,13 @@ import pytest
 
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.joint import near_equations
-from sdimu_calibration.core.joint.equation_share import EquationShare, equation_share, single_equations
+from sdimu_calibration.core.joint.equation_share import (
+    EquationShare,
+    asked,
+    equation_share,
+    name_of_candidate,
+    single_equations,
+)
 from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 from sdimu_calibration.core.verdict import Verdict
 
@@ -53,8 +60,7 @@ def test_the_share_of_a_recording_is_what_its_evidence_says_of_an_equation(test_
     """Beside everything that the recording estimates the equation gains what a scan of it gains."""
     fit = solve(test_of_one, options.model)
     share = equation_share(fit, ("accel_scale_x",))
-    effect = next(e for e in single_equations(False) if e.labels == (HIDDEN,))
-    evidence = fit.evidence([effect])
+    evidence = fit.evidence([single_equations(False)[HIDDEN]])
     assert not fit.noise_terms
     J, d = evidence.information.diagonal_given(evidence.model, evidence.weight)
     place, at = share.labels.index(HIDDEN), fit.bare.names.index("accel_scale_x")
@@ -83,3 +89,13 @@ def test_a_set_tells_an_equation_in_the_place_of_wrong_effects(options):
     one = found.findings[0]
     assert abs(one.value - 80.0 * 9.80665e-6) < 4.0 * one.sigma
     assert [a.about for a in found.advice if a.about] == [(HIDDEN,)]
+
+
+def test_another_process_finds_an_equation_by_its_label():
+    """What a job names is plain text, so that processes of a set work on it; it is the same equation there."""
+    one = single_equations(has_temperature=True)[HIDDEN]
+    assert name_of_candidate(one) == HIDDEN
+    assert asked(HIDDEN) is one
+    assert name_of_candidate(asked("accel_quadratic_x")) == "accel_quadratic_x"
+    own = replace(one, name="mine", parameters=(replace(one.parameters[0], name="mine"),))
+    assert name_of_candidate(own) is own

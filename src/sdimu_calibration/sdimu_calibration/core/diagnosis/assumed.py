@@ -17,6 +17,7 @@ from sdimu_calibration.core.diagnosis.found import catalogue_columns
 from sdimu_calibration.core.diagnosis.problem import Problem
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.linear import LinearEvidence
+from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.posterior.coefficients import drift_mean
 
 
@@ -80,7 +81,7 @@ def assumed_absent(d: Diagnosis) -> tuple[Assumed, ...]:
 
 def _not_told(d: Diagnosis) -> list[int]:
     """Columns of effects of a known size that are neither told nor what an effect that is told may be instead."""
-    chosen, p = set(d.found.chosen.tolist()), len(d.evidence.weight)
+    chosen, p = {*d.found.chosen.tolist(), *_of_another_name(d)}, len(d.evidence.weight)
     told = {label for one in d.found_effects for label in one.alike}
     told |= {share.name for one in d.found_effects for share in one.may_be}
     return [
@@ -90,6 +91,21 @@ def _not_told(d: Diagnosis) -> list[int]:
         and np.isfinite(d.evidence.prior[c - p])
         and not {d.evidence.candidates[c - p].label, d.evidence.candidates[c - p].coefficient} & told
     ]
+
+
+def _of_another_name(d: Diagnosis) -> list[int]:
+    """Columns that are a coefficient of the model by another name: a mass unbalance is a sensitivity to force."""
+    full, effects = d.evidence.information, d.fit.sensors.effects
+    J, _ = full.diagonal_given(d.evidence.model, d.evidence.weight)
+    named = {effect.family or effect.name for effect in effects}
+    inside = {effect.contained_in for effect in effects} - {""}
+    out = []
+    for column in catalogue_columns(d).tolist():
+        candidate = d.evidence.candidate(column)
+        same = candidate.family in inside or candidate.effect.contained_in in named
+        if same and J[column] < TESTABLE**2 * full.J[column, column]:
+            out.append(column)
+    return out
 
 
 def _stated_sigmas(d: Diagnosis) -> Floats:

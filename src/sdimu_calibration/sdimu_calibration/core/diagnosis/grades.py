@@ -48,9 +48,15 @@ class Graded:
     """It is an equation that no physics names."""
 
     @property
+    def of_named(self) -> float:
+        """Probability of what is named: of all that it may be where that is open, else of the likeliest alone."""
+        alone = self.may_be[0].probability if len(self.may_be) == 1 else self.probability
+        return min(self.probability, alone)
+
+    @property
     def certain(self) -> bool:
-        """Whether it is certain that one of it is missing."""
-        return self.probability >= CERTAIN
+        """Whether it is certain that what is named is missing, or one of it."""
+        return self.of_named >= CERTAIN
 
     @property
     def is_open(self) -> bool:
@@ -89,9 +95,9 @@ def each_grade(found: Sequence[Graded], certain: str = "Certain") -> tuple[str, 
     firm = [one.words for one in found if one.certain and not one.is_open]
     told = [f"{certain}: {listed(firm)}."] if firm else []
     told += [f"{certain}, but open which: {_open(one)}." for one in found if one.certain and one.is_open]
-    told += [f"Likely ({in_percent(one.probability)}): {_likely(one)}." for one in found if not one.certain]
+    told += [f"Likely ({in_percent(one.of_named)}): {_likely(one)}." for one in found if not one.certain]
     more = len(told) - LISTED
-    return (*told[:LISTED], *([f"{more} more are in the table."] if more > 0 else []))
+    return (*told[:LISTED], *([f"{more} more {'is' if more == 1 else 'are'} in the table."] if more > 0 else []))
 
 
 def _family(one: Found, shares: Sequence[Share], told: Probabilities | None) -> str:

@@ -49,10 +49,10 @@ SCALE_CUBIC = register_family(
     "dw_i = k_i w_i^3",
     per_axis_columns(GYRO, lambda m: m.w**3),
     ("s^2/rad^2", "ppm*s^2/deg^2"),
-    (5, 25, 100),
+    (0.1, 0.5, 2),
     excitation=frozenset({Excitation.TWO_RATES}),
     sheet="scale-factor nonlinearity, third order",
-    typical="5-100 ppm of full scale",
+    typical="10-200 ppm at 10 deg/s",
     description="At one rate the same as the scale factor.",
     confused_with=("gyro_scale",),
 )

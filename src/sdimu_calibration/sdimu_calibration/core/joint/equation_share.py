@@ -7,18 +7,22 @@ come near (`near_equations`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.candidates import equations
 from sdimu_calibration.core.effects.effect import Effect
+from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.estimation.fit import Fit
+from sdimu_calibration.core.evidence.candidate import OWN
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.evidence.testable import TESTABLE
+from sdimu_calibration.core.joint.scope import by_name
 from sdimu_calibration.core.posterior.board import Board
 from sdimu_calibration.core.posterior.noise_models import NoiseModel
 
@@ -45,9 +49,22 @@ class EquationShare:
     """`d_told`, `d`: shapes (t,) and (n,). Pull about the fit (1/SI)."""
 
 
-def single_equations(has_temperature: bool) -> list[Effect]:
-    """Every equation of `candidates.equations`, of one parameter each."""
-    return [one for effect in equations(has_temperature) for one in effect.singles]
+@cache
+def single_equations(has_temperature: bool) -> Mapping[str, Effect]:
+    """Every equation of `candidates.equations`, of one parameter each, by its label."""
+    return {one.labels[0]: one for effect in equations(has_temperature) for one in effect.singles}
+
+
+def asked(named: str | Effect) -> Effect:
+    """Find a candidate by its key or, of an equation, by its label; an effect is itself."""
+    known = single_equations(has_temperature=True)
+    return known[named] if isinstance(named, str) and named in known else resolve(named)
+
+
+def name_of_candidate(effect: Effect) -> str | Effect:
+    """Name a candidate so that another process finds it by `asked`; an effect of the user's own stands for itself."""
+    is_equation = effect.title == OWN and effect.labels[0] in single_equations(has_temperature=True)
+    return effect.labels[0] if is_equation else by_name(effect)
 
 
 def equation_share(fit: Fit, told: Sequence[str]) -> EquationShare:
@@ -64,7 +81,7 @@ def equation_share(fit: Fit, told: Sequence[str]) -> EquationShare:
     evidence = fit.bare.in_inner(wander.inner)
     board, noise = Board(evidence, np.empty(0, np.int64), frozenset(), wander), NoiseModel(tuple(fit.noise_terms))
     one, p = board.in_noise(noise), len(evidence.weight)
-    effects = single_equations(fit.has_temperature)
+    effects = list(single_equations(fit.has_temperature).values())
     blocks = [effects[k : k + _BLOCK] for k in range(0, len(effects), _BLOCK)]
     seen = [board.seen_of(evidence.signature(block), np.arange(p), noise) for block in blocks]
     own, across, d = (np.concatenate(parts) for parts in zip(*seen, strict=True))

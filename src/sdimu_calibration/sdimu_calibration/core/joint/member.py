@@ -27,10 +27,10 @@ from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.stretch_length import wander_in
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.run_rows import RunRows
-from sdimu_calibration.core.joint.equation_share import EquationShare, equation_share
+from sdimu_calibration.core.joint.equation_share import EquationShare, asked, equation_share, name_of_candidate
 from sdimu_calibration.core.joint.reduction import Reduction, reduced
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, rival_noises
-from sdimu_calibration.core.joint.scope import by_name, is_local, tagged
+from sdimu_calibration.core.joint.scope import is_local, tagged
 from sdimu_calibration.core.joint.shared_function import SharedFunction, beside, noise_beside
 from sdimu_calibration.core.joint.stretch_rows import Places, stretch_rows
 from sdimu_calibration.core.noise_term import NoiseTerm, may_be_an_effect
@@ -216,8 +216,8 @@ def _of_all(effects: Sequence[str | Effect], job: Job) -> tuple[str, ...]:
     own = {label for key in job.local for label in selection.resolve(key).labels}
     kept: list[str | Effect] = []
     for effect in effects:
-        whole = selection.resolve(effect)
-        kept += [effect] if own.isdisjoint(whole.labels) else map(by_name, without(whole, own))
+        whole = asked(effect)
+        kept += [effect] if own.isdisjoint(whole.labels) else map(name_of_candidate, without(whole, own))
     return cast("tuple[str, ...]", tuple(kept))
 
 
@@ -239,7 +239,7 @@ def _untagged(about: Mapping[str, float], name: str) -> dict[str, float]:
 def _report(job: Job, fit: Fit) -> Report:
     name, recording = job.member.name, fit.test.recording
     tried_in_all = _of_all(job.candidates, job)
-    shared = [selection.resolve(e) for e in tried_in_all]
+    shared = [asked(e) for e in tried_in_all]
     own = _local_candidates(fit) if job.with_local else []
     rivals: tuple[InOneNoise, ...] = ()
     terms = fit.noise_terms

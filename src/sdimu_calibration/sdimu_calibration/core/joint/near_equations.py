@@ -65,7 +65,7 @@ def near_equations(found: SetSearch, run: Run) -> tuple[Effect, ...]:
     all_ = _together(shares)
     gain = gains_in_place(all_, fit.estimate.values[at], fit.weight[at])
     order = np.argsort(-gain, kind="stable")[:_MOST]
-    known = {effect.labels[0]: effect for effect in single_equations(has_temperature=True)}
+    known = single_equations(has_temperature=True)
     return tuple(known[all_.labels[k]] for k in order.tolist() if gain[k] > _LEAST)
 
 

@@ -47,7 +47,8 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
         of_all, of_near = in_percent(found.probability), in_percent(near.probability)
         thing = f"{what[0].lower()}{what[1:]}"
         return f"Whether {thing} comes back is open ({of_all}): nearest is the same {_WORDS[near.kind]} ({of_near})."
-    of_each = ": it belongs to each run" if {ATTITUDE, TIME} <= set(found.told) else ""
+    whose = "it belongs to each run" if unexplained else "it is noise of each run"
+    of_each = f": {whose}" if {ATTITUDE, TIME} <= set(found.told) else ""
     where = f"{' in the stops' if unexplained else ''} ({', '.join(found.sensors)})"
     return (
         f"{what}{where} does not come back at the same {listed(found.told, 'or')} "
@@ -55,11 +56,13 @@ def answer_in_words(found: Recurrence, unexplained: bool) -> str:
     )
 
 
-def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]:
+def next_steps(found: Recurrence | None, unexplained: bool, function: bool = False) -> list[Advice]:
     """Say what to do about what comes back, the most useful first.
 
     Parameters
     ----------
+    unexplained : bool
+        The verdict on the set: else what does not come back is noise, and no mount or cable.
     function : bool
         An unknown function of the attitude explains it, whether or not the stops come back.
     """
@@ -73,7 +76,7 @@ def next_steps(found: Recurrence | None, function: bool = False) -> list[Advice]
         return [_NEXT[kind] for kind in found.answer]
     if ATTITUDE not in found.told or found.is_open:
         return [Advice(Do.REVERSE_AND_ADD)]
-    return [Advice(Do.LOOK_AT_MOUNT)]
+    return [Advice(Do.LOOK_AT_MOUNT)] if unexplained else []
 
 
 def listed(kinds: Sequence[str], between: str) -> str:

@@ -114,7 +114,11 @@ def diagnose_set(
     why = why if found.stood else (*why, f"{capital(TO_AND_FRO)}.")
     test = found.after.base.test
     standing = replace(found.standing, imu=test.origin.imu_file or found.standing.imu, site=test.origin.site_stated)
-    steps = _look_at(facts.functions) if facts.is_of_each else next_steps(again, facts.beside_function)
+    steps = (
+        _look_at(facts.functions)
+        if facts.is_of_each
+        else next_steps(again, word == Verdict.UNEXPLAINED, facts.beside_function)
+    )
     kept = [] if word == Verdict.UNEXPLAINED else _added(found, facts.findings)
     return SetDiagnosis(
         word,

@@ -22,6 +22,7 @@ from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.solve import with_effects
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.joint.changed import change_of, stable_effects, with_changes
+from sdimu_calibration.core.joint.equation_share import name_of_candidate
 from sdimu_calibration.core.joint.function_fit import in_size, with_function, with_own_functions
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, tagged
@@ -320,7 +321,9 @@ def _candidates(fit: SetFit, extra: Sequence[Effect], finer: Sequence[Effect]) -
 def _gathered(fit: SetFit, tried: Sequence[Effect], run: Run) -> SetFit:
     """Return the fit with the signatures of effects in its reports."""
     # The search looks at what is left of these rows, not of those before.
-    return with_reports(fit, asked_again(fit, run, candidates=tuple(map(by_name, tried)), with_local=True, rivals=True))
+    return with_reports(
+        fit, asked_again(fit, run, candidates=tuple(map(name_of_candidate, tried)), with_local=True, rivals=True)
+    )
 
 
 def _nearer(chosen: Sequence[Candidate], told: Sequence[Candidate], tried: Sequence[Effect]) -> list[Effect]:
