@@ -141,7 +141,7 @@ docs-setup: $(BOOK)
 
 # The book, out/docs/index.html: it is read without a network. Every warning is an error.
 docs: $(BOOK)
-	$(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
+	nice -n 10 $(BIN)/python -m sphinx -W --keep-going -q -b html doc out/docs
 
 # Minutes: every kind of fault in the data at five sizes.
 faults: setup

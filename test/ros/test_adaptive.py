@@ -100,8 +100,9 @@ def test_what_was_found_for_sure_is_in_the_result_whose_limits_hold(tmp_path):
         told, err = process.communicate(timeout=DEADLINE_S)
     finally:
         process.kill()
+    assert process.returncode in {0, 3}, err
     last = read_json(out / "choices.json", "sdimu-choices/1")["choices"][-1]
-    assert last["reached"], told
+    assert last["reached"], told + err
     assert last["decided"] == ["accel_quadratic_z"]
     live = read_result(out / "result.json")
     assert "accel_quadratic_z" in live.names, err

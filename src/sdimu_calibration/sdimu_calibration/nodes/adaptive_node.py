@@ -70,7 +70,7 @@ class AdaptiveNode:
         if aside := put_aside(self._out / CHOICES):
             self.node.get_logger().warning(f"{self._out / CHOICES}: of an earlier test; kept as {aside}")
         self._goals, self._models, self._menu = aimed(goals, tell), (added,), Menu()
-        setup = WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False)
+        setup = WorkerSetup(self._out / JOURNAL, options, model, next_move, pictures=False, awaited=True)
         self._worker = Worker(setup, self.node.get_logger().warning)
         self._driving = Driving(self.node, self._act)
         self.done = self._driving.done

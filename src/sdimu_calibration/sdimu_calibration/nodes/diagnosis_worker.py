@@ -59,6 +59,8 @@ class WorkerSetup:
     """Draw each diagnosis."""
     report: Path | None = None
     """Folder that gets diagnosis.json and report.html at the end of the test."""
+    awaited: bool = False
+    """The test goes on with the answer: no sample comes first meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -198,9 +200,9 @@ def work(pipe: Connection) -> None:
     """
     # Ctrl-C reaches every process of a terminal; this one ends with its node.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(_NICE)
     try:
         setup = pipe.recv()
+        os.nice(0 if setup.awaited else _NICE)
         diagnoser = Diagnoser(setup)
         while True:
             answer = diagnoser.answer(pipe.recv())

@@ -75,9 +75,9 @@ def free_inputs(times: Timetable) -> list[Effect]:
 def equations(has_temperature: bool) -> list[Effect]:
     """Monomials of the physical variables on every sensor: the alphabet of equations that no effect has.
 
-    Forces to third order, rates to second, their products, each also growing with time (and temperature), forces in
-    turns alone; with |x| for even terms. What a registered effect already is comes twice; the catalogue then has the
-    word.
+    Forces to third order, the fourth powers of each, rates to second, their products, each also growing with time (and
+    temperature), forces in turns alone; with |x| for even terms. What a registered effect already is comes twice; the
+    catalogue then has the word.
     """
 
     def powers(total: int, kinds: int) -> list[tuple[int, ...]]:
@@ -97,6 +97,9 @@ def equations(has_temperature: bool) -> list[Effect]:
             if j > i:
                 out += _plain(f"e{AXES[i]} e{AXES[j]}", product(_east, i, _east, j))
             out += _plain(f"e{AXES[i]} a{AXES[j]}", product(_east, i, lambda m: m.a, j))
+    # Between a square and a magnitude, which together imitate it.
+    for i in range(3):
+        out += _monomial(tuple(4 * (i == k) for k in range(3)), (0, 0, 0), "")
     # A sensitivity to force that is another one while the table turns.
     for along in powers(1, 3):
         out += _monomial(along, (0, 0, 0), "moving")

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Ints
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.diagnosis.free_input_test import FreeInputTest, free_input_test
 from sdimu_calibration.core.diagnosis.ground import Ground, Request, extended, fresh_ground, next_ground
 from sdimu_calibration.core.diagnosis.problem import Problem
@@ -46,6 +46,9 @@ MOST_ROUNDS = 4
 to and fro between effects that look alike."""
 _MOST_WHITENED = 2
 """Number of times (1) at most that rows are whitened in noise that was found: of the first round, and at the end."""
+_ALIKE = 0.9
+"""Correlation of the estimates of two effects of one sensor (1) from which they may be the parts of one cause: what one
+adds the other takes off, as a square and a magnitude do for a fourth power."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
@@ -74,8 +77,37 @@ class Round:
     def wants_equations(self) -> bool:
         """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
-        many = len(self.found.chosen) >= _MANY
-        return self.left_after.p_value < UNEXPLAINED_P or many or refused or bool(self.found.noise)
+        parts = len(self.found.chosen) >= _MANY or self._cancels
+        return self.left_after.p_value < UNEXPLAINED_P or parts or refused or bool(self.found.noise)
+
+    @property
+    def _cancels(self) -> bool:
+        """Whether two effects that were chosen act on one sensor, and their estimates are nearly opposite."""
+        chosen = self.found.chosen.tolist()
+        if len(chosen) < 2:
+            return False
+        known, weight, _ = Problem(self.found.evidence).known(chosen)
+        _, covariance = self.found.evidence.information.estimate(known, weight)
+        return opposed(self.chosen, covariance[-len(chosen) :, -len(chosen) :])
+
+
+def opposed(chosen: Sequence[Candidate], covariance: Floats) -> bool:
+    """Whether two effects act on one sensor alone, and what one adds the other takes off.
+
+    Parameters
+    ----------
+    chosen : sequence of Candidate, length k
+    covariance : ndarray, shape (k, k)
+        Of their estimates (SI).
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    sensors = [{term.channel for term in one.effect.terms} for one in chosen]
+    return any(
+        sensors[i] == sensors[k] and abs(covariance[i, k]) > _ALIKE * sigma[i] * sigma[k]
+        for k in range(len(chosen))
+        for i in range(k)
+        if len(sensors[k]) == 1
+    )
 
 
 def searched(request: Request, progress: Progress) -> tuple[Request, Round]:

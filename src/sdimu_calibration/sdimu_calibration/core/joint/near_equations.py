@@ -14,6 +14,7 @@ from itertools import chain, combinations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.diagnosis.rounds import opposed
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.information import solved
@@ -41,7 +42,10 @@ def asks_for_equations(found: SetSearch) -> bool:
     if any(report.estimator == HandheldFit.estimator for report in found.after.reports):
         return False
     drawn = any(found.drawn_in(k) for k in range(len(found.after.reports)))
-    return len(found.chosen) >= _MANY or found.function_is_likely or drawn or not found.stood
+    names, covariance = found.after.names, found.after.estimate.covariance
+    at = [place_of(names, c) for c in found.chosen]
+    parts = len(at) >= _MANY or opposed(found.chosen, covariance[np.ix_(at, at)])
+    return parts or found.function_is_likely or drawn or not found.stood
 
 
 def near_equations(found: SetSearch, run: Run) -> tuple[Effect, ...]:
