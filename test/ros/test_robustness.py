@@ -66,6 +66,22 @@ def test_a_killed_calibration_is_not_waited_for_and_its_successor_goes_on(bench:
     assert samples_of(60.0) / 4 < taken < samples_of(60.0)
 
 
+def test_a_node_that_gets_no_core_for_some_seconds_loses_nothing(bench: FitSession) -> None:
+    """As on a machine with more work than cores. With a lease of 3 s the others forgot it, and 25 s were missing."""
+    write_plan(bench.plan, 60.0)
+    bench.speed = 20.0
+    for name in NODES:
+        bench.start(name)
+    bench.wait(lambda: bench.recorded_bytes() > 50_000, "a third of the data")
+    process = bench.children._children["calibration"].process
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(4.5)
+    process.send_signal(signal.SIGCONT)
+    bench.wait_for_end()
+    assert read_result(bench.folder).data["samples"] == samples_of(60.0)
+    assert len(imu_stamps(bench.folder / "bag")) == samples_of(60.0)
+
+
 def test_a_killed_recorder_loses_at_most_a_second_and_stalls_nobody(bench: FitSession) -> None:
     write_plan(bench.plan, 60.0)
     bench.speed = 20.0

@@ -14,7 +14,7 @@ samples and then refuses. So consumers grant credits, and a simulated producer s
 
 Nothing here is needed to use a real driver: a consumer that never grants a credit never holds the
 producer, and a consumer without a crediting producer just listens. A consumer that vanished is
-forgotten when DDS has dropped it (the lease, 3 s with config/ros/fastdds.xml); one that stays idle at the same
+forgotten when DDS has dropped it (the lease, 10 s with config/ros/fastdds.xml); one that stays idle at the same
 stamp for five seconds although more was sent has lost it, and is counted as being level.
 """
 
@@ -49,8 +49,8 @@ is sent again at the writer's next heartbeat, up to 3 s later. Repeats are count
 had no processor has not looked for data meanwhile."""
 REFUSED_S = 120.0
 """Longest wait (s) for a subscriber that takes nothing: a node that starts on a busy machine needed more than 20 s."""
-TELL_REFUSED_S = 5.0
-"""Time (s) after which such a wait is told: a killed subscriber is forgotten after 3 s."""
+TELL_REFUSED_S = 15.0
+"""Time (s) after which such a wait is told: a killed subscriber is forgotten after 10 s."""
 NO_LIMIT = 2**63 - 1
 NS = 1_000_000_000
 
