@@ -197,7 +197,7 @@ LONG = {
         "test_two_recordings_that_lack_an_effect_show_it_in_the_noise_of_those_that_have_it",
         "test_what_chance_reaches_is_known_for_two_recordings",
     ),
-    "test/sdimu_calibration/core/diagnosis/test_opposed.py": (
+    "test/sdimu_calibration/core/diagnosis/test_parts.py": (
         "test_a_fourth_power_is_told_as_that_and_not_as_a_square_and_an_asymmetry",
         "test_a_square_beside_an_asymmetry_stays_both",
     ),

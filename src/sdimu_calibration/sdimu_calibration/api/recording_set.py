@@ -170,6 +170,11 @@ class JointDiagnosis(Diagnosed):
         return self.core.unknown
 
     @property
+    def ladder(self) -> tuple[tuple[str, float], ...]:
+        """Name and held-out error (sigma) of the model as given, then with one effect of all recordings more each."""
+        return self.core.ladder.errors
+
+    @property
     def advice(self) -> tuple[str, ...]:
         """What to do next, one sentence each, with the calls that do it; `set` is what was opened."""
         return tuple(sentence(one, IN_PYTHON_OF_A_SET) for one in self.core.advice)

@@ -48,7 +48,7 @@ QUIET_REPEATS = 20
 is sent again at the writer's next heartbeat, up to 3 s later. Repeats are counted, not seconds: a node that was busy or
 had no processor has not looked for data meanwhile."""
 REFUSED_S = 120.0
-"""Longest wait (s) for a subscriber that takes nothing: a node that starts on a busy machine needed more than 20 s."""
+"""Longest wait (s) for a subscriber that takes nothing: 20 s ended a test on a busy machine."""
 TELL_REFUSED_S = 15.0
 """Time (s) after which such a wait is told: a killed subscriber is forgotten after 10 s."""
 NO_LIMIT = 2**63 - 1

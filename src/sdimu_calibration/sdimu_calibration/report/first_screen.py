@@ -254,7 +254,7 @@ def of_set(found: SetDiagnosis, spell: Spell | None = None) -> FirstScreen:
     title = _COSTS if found.findings else _PREDICTS
     # Where the search went to and fro the coefficients are those of the joint fit.
     worst = _off_table(off[:_WORST], OVER_MODELS if found.probabilities else "one sigma of the joint fit")
-    ladder = _strip(rungs, more, _RIGHT.format(_RECORDINGS))
+    ladder = _strip(rungs, more, _RIGHT.format("recordings"))
     return FirstScreen(tone, _in_lines(found.statements), tuple(costs), told, title, tag=tag, ladder=ladder, off=worst)
 
 
@@ -293,7 +293,6 @@ def render(first: FirstScreen, *pictures: str) -> str:
 
 
 HELD_OUT = "held-out error (sigma)"
-_RECORDINGS = "recordings"
 _RIGHT = "Held-out error: at {} that the fit has not seen; 1 is right."
 _WHITE = (
     "Held-out error: at {} that the fit has not seen, in white noise, in which models compare: what was learned as "

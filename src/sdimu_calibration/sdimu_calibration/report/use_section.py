@@ -26,7 +26,9 @@ _HOW = (
 )
 _SHORT = " There is no room for 10 minutes: the segments are as long as the recording allows."
 _OF_PARTS = "Each segment was held out of the fit that navigates it."
-_OF_OTHERS = "Each recording is navigated with what the other power-ons tell; biases of its own power-on are not known."
+_OF_OTHERS = (
+    "Each recording is navigated with what the others tell; the biases of a power-on of its own they do not know."
+)
 _SKIP_S = 30.0
 """Logarithmic axes begin here: before there is nothing to see and much room for it."""
 _COLUMNS = (

@@ -47,8 +47,8 @@ to and fro between effects that look alike."""
 _MOST_WHITENED = 2
 """Number of times (1) at most that rows are whitened in noise that was found: of the first round, and at the end."""
 _ALIKE = 0.9
-"""Correlation of the estimates of two effects of one sensor (1) from which they may be the parts of one cause: what one
-adds the other takes off, as a square and a magnitude do for a fourth power."""
+"""Correlation of the estimates of two effects of one sensor (1) from which they may be the parts of one cause: a square
+and a magnitude are those of a fourth power."""
 _MANY = 3
 """Number of chosen catalogue terms from which one equation is tried in their place: so many may be the parts of one
 cause."""
@@ -77,22 +77,22 @@ class Round:
     def wants_equations(self) -> bool:
         """Whether something is left, or took suspiciously many terms, or looks like noise, or nothing helped."""
         refused = not len(self.free) and not len(self.found.chosen)
-        parts = len(self.found.chosen) >= _MANY or self._cancels
+        parts = len(self.found.chosen) >= _MANY or self._has_parts
         return self.left_after.p_value < UNEXPLAINED_P or parts or refused or bool(self.found.noise)
 
     @property
-    def _cancels(self) -> bool:
-        """Whether two effects that were chosen act on one sensor, and their estimates are nearly opposite."""
+    def _has_parts(self) -> bool:
+        """Whether two effects that were chosen may be the parts of one cause."""
         chosen = self.found.chosen.tolist()
         if len(chosen) < 2:
             return False
         known, weight, _ = Problem(self.found.evidence).known(chosen)
         _, covariance = self.found.evidence.information.estimate(known, weight)
-        return opposed(self.chosen, covariance[-len(chosen) :, -len(chosen) :])
+        return are_parts(self.chosen, covariance[-len(chosen) :, -len(chosen) :])
 
 
-def opposed(chosen: Sequence[Candidate], covariance: Floats) -> bool:
-    """Whether two effects act on one sensor alone, and what one adds the other takes off.
+def are_parts(chosen: Sequence[Candidate], covariance: Floats) -> bool:
+    """Whether two effects act on one sensor alone, and their estimates hang together: parts of one cause, perhaps.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from itertools import chain, combinations
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
-from sdimu_calibration.core.diagnosis.rounds import opposed
+from sdimu_calibration.core.diagnosis.rounds import are_parts
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.evidence.information import solved
@@ -22,7 +22,7 @@ from sdimu_calibration.core.evidence.testable import TESTABLE
 from sdimu_calibration.core.joint.equation_share import EquationShare, single_equations
 from sdimu_calibration.core.joint.set_fit import Run, SetOptions, job_of
 from sdimu_calibration.core.joint.set_found import SetSearch
-from sdimu_calibration.core.joint.set_search import place_of
+from sdimu_calibration.core.joint.set_search import places_of_chosen
 from sdimu_calibration.core.recording import DataError
 
 _MANY = 3
@@ -42,9 +42,8 @@ def asks_for_equations(found: SetSearch) -> bool:
     if any(report.estimator == HandheldFit.estimator for report in found.after.reports):
         return False
     drawn = any(found.drawn_in(k) for k in range(len(found.after.reports)))
-    names, covariance = found.after.names, found.after.estimate.covariance
-    at = [place_of(names, c) for c in found.chosen]
-    parts = len(at) >= _MANY or opposed(found.chosen, covariance[np.ix_(at, at)])
+    at, covariance = places_of_chosen(found), found.after.estimate.covariance
+    parts = len(at) >= _MANY or are_parts(found.chosen, covariance[np.ix_(at, at)])
     return parts or found.function_is_likely or drawn or not found.stood
 
 
@@ -59,7 +58,7 @@ def near_equations(found: SetSearch, run: Run) -> tuple[Effect, ...]:
         Does the jobs.
     """
     fit = found.after
-    at = [place for place in (place_of(fit.names, c) for c in found.chosen) if place >= 0]
+    at = places_of_chosen(found)
     told = tuple(fit.names[place] for place in at)
     options = SetOptions(fit.model, local=fit.local)
     jobs = [replace(job_of(member, options, fit, learn=False), function=None, equations=told) for member in fit.members]

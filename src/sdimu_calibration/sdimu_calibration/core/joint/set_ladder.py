@@ -19,7 +19,7 @@ from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.set_evidence import held_out
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, columns_of, grouped_rows, job_of, power_on
 from sdimu_calibration.core.joint.set_found import SetSearch
-from sdimu_calibration.core.joint.set_search import place_of
+from sdimu_calibration.core.joint.set_search import places_of_chosen
 from sdimu_calibration.core.recording import DataError
 
 _MOST_NAVIGATED = 4
@@ -95,8 +95,7 @@ def set_ladder(found: SetSearch, run: Run) -> SetLadder:
 
 def _models(found: SetSearch) -> list[_Model]:
     """Models from that as given on, with one effect more each."""
-    names = found.after.names
-    columns = [names[place_of(names, c)] for c in found.chosen]
+    columns = [found.after.names[place] for place in places_of_chosen(found)]
     labels = ("", *(c.label for c in found.chosen))
     return [_Model(label, frozenset(columns[k:])) for k, label in enumerate(labels)]
 

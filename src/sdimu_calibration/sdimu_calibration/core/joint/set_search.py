@@ -362,6 +362,11 @@ def place_of_local(names: Sequence[str], find: LocalFind) -> int:
     return next(list(names).index(name) for name in called if name in names)
 
 
+def places_of_chosen(found: SetSearch) -> list[int]:
+    """Places of what was found in all recordings among the coefficients of the fit with it."""
+    return [place_of(found.after.names, candidate) for candidate in found.chosen]
+
+
 def place_of(names: Sequence[str], candidate: Candidate) -> int:
     """Place of a coefficient that was found among those of a fit; -1 where it is not there."""
     # Beside another variant it is called by its label: the plain name is then that of the other one.

@@ -1,13 +1,11 @@
-"""Two effects that take off from each other may be the parts of one cause: equations are asked for then."""
+"""Two effects of one sensor whose estimates hang together may be parts of one cause: equations are asked for then."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sdimu_calibration.core.diagnosis.rounds import opposed
+from sdimu_calibration.core.diagnosis.rounds import are_parts
 from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.evidence.candidate import split
 from sdimu_calibration.core.verdict import Verdict
@@ -30,15 +28,14 @@ def candidates(*keys):
 def test_they_are_effects_of_one_sensor_whose_estimates_hang_together(second, correlation, asked):
     sigma = np.array([2e-5, 3e-6])
     covariance = np.array([[1.0, correlation], [correlation, 1.0]]) * np.outer(sigma, sigma)
-    assert opposed(candidates("accel_quadratic_z", second), covariance) == asked
+    assert are_parts(candidates("accel_quadratic_z", second), covariance) == asked
 
 
 def test_an_effect_of_all_sensors_is_no_part_of_one():
     both = candidates("accel_quadratic_z", "accel_triad_delay")
     covariance = np.array([[1.0, 0.99], [0.99, 1.0]])
-    whole = SimpleNamespace(effect=both[1].effect)
-    assert len({term.channel for term in whole.effect.terms}) == 3
-    assert not opposed(both, covariance)
+    assert len({term.channel for term in both[1].effect.terms}) == 3
+    assert not are_parts(both, covariance)
 
 
 def test_a_fourth_power_is_told_as_that_and_not_as_a_square_and_an_asymmetry(bench):
