@@ -46,7 +46,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.specification import Model
 from sdimu_calibration.nodes import calibration_messages as messages
-from sdimu_calibration.nodes.credits import STREAM, Consumer, Producer, publish
+from sdimu_calibration.nodes.credits import BLOCK, STREAM, Consumer, Producer, publish
 from sdimu_calibration.nodes.diagnosing import Diagnosing
 from sdimu_calibration.nodes.diagnosis_worker import WorkerSetup
 from sdimu_calibration.nodes.feed import Feed
@@ -66,7 +66,6 @@ from sdimu_calibration.storage.files.model_choice import model_word, named_model
 from sdimu_calibration.storage.files.result_file import write_result
 from sdimu_calibration.storage.files.whole_file import written_together
 
-BLOCK = 20
 SETTLE_S = 5.0
 """Time (s) after the end of the samples for which the last status is awaited: a lost packet is sent again after 3 s."""
 FAREWELL_S = 10.0
@@ -124,7 +123,7 @@ class CalibrationNode:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", STREAM)
         self._save = node.create_service(Trigger, "~/save", self._answer_save)
         self._reset = node.create_service(Trigger, "~/reset", self._answer_reset)
-        self._stream = Consumer(node, ticker, self._topics.imu, every=BLOCK, on_end=self._take_end)
+        self._stream = Consumer(node, ticker, self._topics.imu, on_end=self._take_end)
         self._listeners = (
             Listener(node, ticker, DiagnosticArray, self._topics.status, self._take_status, late=bool(resumed)),
             Listener(node, ticker, Temperature, self._topics.temperature, self._take_temperature, late=bool(resumed)),

@@ -18,6 +18,7 @@ import numpy as np
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.data.blocks import let_go
 from sdimu_calibration.core.data.windows import block_means, runs
 from sdimu_calibration.core.recording import DataError, Recording
 from sdimu_calibration.core.specification import ImuSpecification
@@ -83,11 +84,12 @@ def detect_static(recording: Recording, scatter: float = SCATTER) -> StaticInter
     width = max(round(WINDOW_S / dt), 4)
     if len(recording.t) < 10 * width:
         raise DataError(f"/imu/data_raw: {recording.t[-1]:.1f} s are too short to find rests in")
-    first, last = runs(still_samples(recording, width, _DRIFT, HOLE, scatter))
+    still, mean = _still(recording, width, _DRIFT, HOLE, scatter)
+    first, last = runs(still)
     long = last - first >= max(round(SHORTEST_S / dt), 3)
     if not long.any():
         raise DataError("/imu/data_raw: no rest of half a second was found: put the IMU down between the turns")
-    first, last = _without_ramps(recording, first[long], last[long], width)
+    first, last = _without_ramps(recording, mean, first[long], last[long])
     return StaticIntervals(*joined(recording, first, last, _FRAGMENT_S), *noise_at(recording, first, last))
 
 
@@ -103,7 +105,7 @@ def noise_at(recording: Recording, first: Ints, last: Ints) -> tuple[float, floa
     return _density(recording.omega_ib_b, first, last, dt), _density(recording.f_ib_b, first, last, dt)
 
 
-def _without_ramps(recording: Recording, first: Ints, last: Ints, width: int) -> tuple[Ints, Ints]:
+def _without_ramps(recording: Recording, mean: Floats, first: Ints, last: Ints) -> tuple[Ints, Ints]:
     """Cut the begin and the end of turns off the rests.
 
     A table runs up within a second or two. In that time its mean rate is below what the bias of a cheap gyro may change
@@ -112,17 +114,16 @@ def _without_ramps(recording: Recording, first: Ints, last: Ints, width: int) ->
 
     Parameters
     ----------
+    mean : ndarray, shape (n, 3)
+        Mean rate of the window about each sample (rad/s).
     first, last : ndarray of int, shape (k,)
         Samples ``first:last`` of each rest.
-    width : int
-        Samples of a window.
 
     Returns
     -------
     first, last : ndarray of int, shape (k,)
         Of the same rests.
     """
-    mean, _ = _moving(recording.omega_ib_b, width)
     near = round(_NEAR_S / recording.interval_s)
     sides = [slice(a, a + min(near, (b - a + 1) // 2)) for a, b in zip(first, last, strict=True)]
     sides += [slice(b - (side.stop - side.start), b) for side, b in zip(sides, last, strict=True)]
@@ -218,29 +219,40 @@ def still_samples(recording: Recording, width: int, turning: float, hole: float,
     ndarray of bool, shape (n,)
         False for half a window at both ends of the recording and to both sides of a hole.
     """
-    mean, rate_scatter = _moving(recording.omega_ib_b, width)
-    _, force_scatter = _moving(recording.f_ib_b, width)
-    still = _like_the_quietest(rate_scatter, recording.omega_ib_b, scatter)
-    still &= _like_the_quietest(force_scatter, recording.f_ib_b, scatter)
+    return _still(recording, width, turning, hole, scatter)[0]
+
+
+def _still(recording: Recording, width: int, turning: float, hole: float, scatter: float) -> tuple[Bools, Floats]:
+    """Find the samples about which the IMU rests (n,), and the mean rate of the window about each (n, 3)."""
+    mean = np.zeros(recording.omega_ib_b.shape)
+    still = _like_the_quietest(recording.omega_ib_b, width, mean, scatter)
+    still &= _like_the_quietest(recording.f_ib_b, width, np.empty((0, 3)), scatter)
     if still.any():
-        still &= np.max(np.abs(mean - np.median(mean[still], axis=0)), axis=1) < turning
+        middle = np.array([np.median(mean[still, axis]) for axis in range(3)])
+        _leave_near(mean, middle, turning, still)
     apart = np.diff(recording.t, prepend=0.0) > hole * recording.interval_s
-    return still & ~(np.convolve(apart, np.ones(width), mode="same")[: len(still)] > 0)
+    if apart.any():
+        still &= ~(np.convolve(apart, np.ones(width), mode="same")[: len(still)] > 0)
+    return still, mean
 
 
-def _moving(values: Floats, width: int) -> tuple[Floats, Floats]:
-    """Mean (n, 3) and summed variance (n,) over the window about each sample; infinite scatter near the ends."""
-    mean = np.zeros(values.shape)
+def _like_the_quietest(values: Floats, width: int, mean: Floats, most: float) -> Bools:
+    """Windows that scatter as the quietest do, or less than the resolution of the sensor; fills `mean` as `_slide`."""
+    values = np.ascontiguousarray(values)
     scatter = np.full(len(values), np.inf)
-    _slide(np.ascontiguousarray(values), values.mean(axis=0), width, mean, scatter)
-    return mean, scatter
+    _slide(values, values.mean(axis=0), width, mean, scatter)
+    floor = float(np.sum(resolution(values) ** 2) / 12.0)
+    like = np.asarray(scatter <= max(most * float(np.quantile(scatter, _QUIETEST)), floor))
+    let_go(values)
+    return like
 
 
 @compiled
 def _slide(values: Floats, middle: Floats, width: int, mean: Floats, scatter: Floats) -> None:
     """Put mean (n, 3) and summed variance (n,) of `width` samples at the middle one of each window, in place.
 
-    Sums are of ``values - middle``: squares of gravity would leave no digits for its scatter.
+    Sums are of ``values - middle``: squares of gravity would leave no digits for its scatter. Near the ends both stay
+    what they are. A `mean` of no rows is not filled.
     """
     total, squares = np.zeros(3), np.zeros(3)
     for i in range(len(values)):
@@ -257,14 +269,17 @@ def _slide(values: Floats, middle: Floats, width: int, mean: Floats, scatter: Fl
                 squares[k] -= old * old
             if i >= width - 1:
                 within = total[k] / width
-                mean[at, k] = within + middle[k]
+                if len(mean):
+                    mean[at, k] = within + middle[k]
                 scatter[at] += squares[k] / width - within * within
 
 
-def _like_the_quietest(scatter: Floats, values: Floats, most: float) -> Bools:
-    """Windows that scatter as the quietest do, or less than the resolution of the sensor."""
-    floor = float(np.sum(resolution(values) ** 2) / 12.0)
-    return np.asarray(scatter <= max(most * float(np.quantile(scatter, _QUIETEST)), floor))
+@compiled
+def _leave_near(mean: Floats, middle: Floats, most: float, still: Bools) -> None:
+    """Leave of `still` (n,) what has a mean (n, 3) within `most` of `middle` (3,) on each axis, in place."""
+    for i in range(len(still)):
+        for k in range(3):
+            still[i] &= abs(mean[i, k] - middle[k]) < most
 
 
 def resolution(values: Floats) -> Floats:
@@ -280,8 +295,19 @@ def resolution(values: Floats) -> Floats:
     ndarray, shape (3,)
         In the unit of `values`; zero for an axis that never changes.
     """
-    steps = np.abs(np.diff(values, axis=0))
-    return np.array([np.min(s[s > 0.0], initial=np.inf) if s.any() else 0.0 for s in steps.T])
+    smallest = np.full(3, np.inf)
+    _smallest_steps(np.ascontiguousarray(values), smallest)
+    return np.where(np.isfinite(smallest), smallest, 0.0)
+
+
+@compiled
+def _smallest_steps(values: Floats, smallest: Floats) -> None:
+    """Lower `smallest` (3,) to the smallest step between neighbouring rows (n, 3) that is not zero, in place."""
+    for i in range(1, len(values)):
+        for k in range(3):
+            step = abs(values[i, k] - values[i - 1, k])
+            if 0.0 < step < smallest[k]:
+                smallest[k] = step
 
 
 def two_sample_variance(values: Floats, first: Ints, last: Ints, width: int) -> tuple[float, int]:

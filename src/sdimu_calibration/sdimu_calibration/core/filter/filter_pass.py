@@ -336,7 +336,9 @@ def _go_on_from(C_nb: Floats, state: PassState) -> None:
     so an error in them is the tilt as it is seen, whatever the azimuth, and tilts so seen add. With the half product
     every shift says something about azimuth that no sample said.
     """
-    state.x[6:9] -= rotation_vector(sparse_product(C_nb, state.C_nb.T))
+    turned = rotation_vector(sparse_product(C_nb, state.C_nb.T))
+    for i in range(3):
+        state.x[6 + i] -= turned[i]
     put(orthonormal(C_nb), state.C_nb, 0, 0)
 
 

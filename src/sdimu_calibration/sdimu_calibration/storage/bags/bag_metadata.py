@@ -98,8 +98,11 @@ def named_files(information: Mapping[str, Any]) -> list[str]:
     return [Path(name).name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
 
 
-class _PlainDumper(yaml.SafeDumper):
-    """YAML without anchors: other readers of bags need not know them."""
+class _PlainDumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """YAML without anchors: other readers of bags need not know them.
+
+    In C where PyYAML has it: a recorder writes its metadata anew for each topic.
+    """
 
     def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 (the name is the base class')
         return True
