@@ -7,7 +7,6 @@ from sdimu_calibration.core.effects.accelerometer_frame import as_asked
 from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.passes import one_pass
-from sdimu_calibration.core.filter.solution import Solution
 from sdimu_calibration.core.plan import Plan, Turn
 from sdimu_calibration.core.planning.predict import prepare
 from sdimu_calibration.storage.files.config import load_imu, load_site
@@ -27,11 +26,10 @@ def perfect_fit(plan: Plan, add: tuple[str, ...] = ()) -> NavigationFit:
     nominal = prepare(plan, site, imu, model, None, None)
     setup = nominal.setup
     done = one_pass(nominal.prepared, setup, nominal.start, nominal.start.C_nb, np.zeros(len(setup.sensors.prior)))
-    solution = Solution(setup, nominal.prepared, nominal.start, done, 1, converged=True)
     test = PreparedTest(nominal.recording, imu, site)
     sensors = setup.sensors
     frame = as_asked(sensors, model.body_frame)
-    return NavigationFit(test, model, sensors, setup, nominal.prepared, nominal.start, solution, frame)
+    return NavigationFit(test, model, sensors, setup, nominal.prepared, nominal.start, done, 1, frame)
 
 
 def part(stops: int) -> Plan:

@@ -1,15 +1,18 @@
-"""What a fit says of its azimuth: too little known, not observable, or not estimated at all."""
+"""What a fit by passes says of its azimuth: too little known, not observable, or not estimated at all."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sdimu_calibration.core import earth
+from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects.bias import GYRO_BIAS
 from sdimu_calibration.core.filter.filter_pass import NAV
-from sdimu_calibration.core.filter.solution import Solution
+from sdimu_calibration.core.filter.pass_loop import Pass
 from sdimu_calibration.core.note import Note, Topic
 from sdimu_calibration.core.results import NOT_TRUSTED
+from sdimu_calibration.core.units import from_si
 
 NO_AZIMUTH = (
     "the noise that was learned hides the azimuth: the horizontal Earth rate was estimated in its place; the "
@@ -26,7 +29,7 @@ _SAME = np.cos(np.radians(10.0))
 """Cosine of a rotation (1) above which two attitudes are one: 10 deg are less than any step of a plan."""
 
 
-def azimuth_warning(solution: Solution) -> str | None:
+def azimuth_warning(setup: TestSetup, prepared: PreparedData, last: Pass) -> str | None:
     """Say so when there are too few attitudes, or the second order of the azimuth exceeds the sigma of a gyro bias.
 
     A wrong azimuth a turns the horizontal Earth rate, O = 7.29e-5 rad/s times the cosine of latitude. The filter counts
@@ -37,57 +40,51 @@ def azimuth_warning(solution: Solution) -> str | None:
     The second order is taken at three sigma, against the smallest sigma of a bias. With one or two attitudes the
     sigmas themselves are bent, and only the attitudes are counted.
     """
-    attitudes = _attitudes(solution)
+    attitudes = _attitudes(last.output.C_nb[prepared.phases.used])
     if attitudes < _LEAST_ATTITUDES:
         told = (
             f"the IMU was at rest in {attitudes} attitude{'s' if attitudes > 1 else ''} only: azimuth and gyro biases "
             f"cannot be separated, and their sigmas are {NOT_TRUSTED}; use a plan with more attitudes"
         )
         return Note(told, Topic.NOT_TRUSTED)
-    P, names = solution.last.state.P, solution.setup.sensors.names
-    sigma = np.sqrt(np.diag(P))
-    biases = [sigma[NAV + i] for i, name in enumerate(names) if name in GYRO_BIAS.labels]
+    sigma = np.sqrt(np.diag(last.state.P))
+    biases = [sigma[NAV + i] for i, name in enumerate(setup.sensors.names) if name in GYRO_BIAS.labels]
     if not biases:
         return None
     azimuth = float(sigma[-1])
-    bent = 0.5 * (_SIGMAS * azimuth) ** 2 * earth.RATE * float(np.cos(solution.setup.site.latitude_rad))
+    bent = 0.5 * (_SIGMAS * azimuth) ** 2 * earth.RATE * float(np.cos(setup.site.latitude_rad))
     if bent <= min(biases):
         return None
     return (
         f"the azimuth is known only to {np.degrees(azimuth):.2g} deg: gyro biases may be wrong by "
-        f"{np.degrees(bent) * 3600.0:.2g} deg/h beyond their sigma; use a plan with more attitudes"
+        f"{from_si(bent, 'deg/h'):.2g} deg/h beyond their sigma; use a plan with more attitudes"
     )
 
 
-def azimuth_note(solution: Solution) -> str | None:
+def azimuth_note(setup: TestSetup, last: Pass) -> str | None:
     """Say so where the Earth turns about the vertical so nearly that no heading can come from it.
 
     What a gyro bias leaves open of the horizontal Earth rate is an azimuth. The filter's own sigma does not show it:
     the second order of an azimuth that may be anything is taken for knowledge. An azimuth that a site states is known.
     """
-    site = solution.setup.site
-    p = len(solution.setup.sensors.prior)
-    biases = [k for k, name in enumerate(solution.setup.sensors.names) if name in GYRO_BIAS.labels]
+    site = setup.site
+    biases = [k for k, name in enumerate(setup.sensors.names) if name in GYRO_BIAS.labels]
     if site.initial_azimuth_rad is not None or not biases:
         return None
-    bias = float(np.sqrt(min(np.diag(solution.last.state.P[NAV : NAV + p, NAV : NAV + p])[biases])))
+    bias = float(np.sqrt(min(np.diag(last.covariance)[biases])))
     horizontal = earth.RATE * abs(float(np.cos(site.latitude_rad)))
     if bias <= _NO_HEADING_RAD * horizontal:
         return None
     return (
         f"the azimuth is not observable: at latitude {np.degrees(site.latitude_rad):.4g} deg the horizontal Earth rate "
-        f"is {_deg_h(horizontal):.2g} deg/h, and the best gyro bias is known to {_deg_h(bias):.2g} deg/h; "
+        f"is {from_si(horizontal, 'deg/h'):.2g} deg/h, and the best gyro bias is known to "
+        f"{from_si(bias, 'deg/h'):.2g} deg/h; "
         "the coefficients do not need it, but headings of this test mean nothing"
     )
 
 
-def _deg_h(rate: float) -> float:
-    return float(np.degrees(rate) * 3600.0)
-
-
-def _attitudes(solution: Solution) -> int:
-    """Count attitudes in which measurements were taken, up to the least that is enough."""
-    C = solution.last.output.C_nb[solution.prepared.phases.used]
+def _attitudes(C: Floats) -> int:
+    """Count the attitudes (e, 3, 3) that differ, up to the least that is enough."""
     count = 0
     while len(C) and count < _LEAST_ATTITUDES:
         count += 1

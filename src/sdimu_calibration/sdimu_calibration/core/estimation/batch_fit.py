@@ -65,11 +65,6 @@ class BatchFit(Fit):
         return self.about.reported_covariance(settled)
 
     @property
-    def converged(self) -> bool:
-        """True: a least squares that does not converge is refused."""
-        return True
-
-    @property
     def start(self) -> Start:
         """Where a navigation of nearly the same model begins."""
         return self.about.start

@@ -137,6 +137,8 @@ class Fit(ABC):
 
     estimator = ""
     """Name of the estimator."""
+    converged = True
+    """The estimate stood still at the end; a least squares that does not is refused."""
     learns_scatter = False
     """The estimator learns the noise beyond white noise from the residuals, a missing effect with it."""
     azimuth_free = False
@@ -193,11 +195,6 @@ class Fit(ABC):
         ndarray, shape (p, p)
             Of the coefficients of `names` (SI).
         """
-
-    @property
-    @abstractmethod
-    def converged(self) -> bool:
-        """Whether the estimate stood still at the end."""
 
     @abstractmethod
     def statistics(self) -> FitStatistics:

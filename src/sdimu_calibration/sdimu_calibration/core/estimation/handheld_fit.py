@@ -95,11 +95,6 @@ class HandheldFit(Fit):
         return out
 
     @property
-    def converged(self) -> bool:
-        """True: a least squares that does not converge is refused."""
-        return True
-
-    @property
     def scatter(self) -> Floats:
         """What is left beyond white noise: force (m/s^2), rate (rad/s), turn (share of the angle), shape (3,)."""
         return self.solution.point.extra

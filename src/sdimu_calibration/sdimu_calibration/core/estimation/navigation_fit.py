@@ -39,7 +39,6 @@ from sdimu_calibration.core.filter.filter_pass import NAV, PassState, new_output
 from sdimu_calibration.core.filter.pass_loop import Pass
 from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_settings
 from sdimu_calibration.core.filter.passes import one_pass
-from sdimu_calibration.core.filter.solution import Solution
 from sdimu_calibration.core.filter.solution import solve as solve_passes
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.measurement_kind import ALL, HELD_ALL, HELD_SENSORS, SENSORS
@@ -78,8 +77,12 @@ class NavigationFit(Fit):
     """With the sensor model of the estimator, q coefficients."""
     prepared: PreparedData
     alignment: Alignment
-    solution: Solution
+    last: Pass
+    """About which the estimate is linear."""
+    passes: int
+    """How many there were."""
     frame_model: AccelerometerFrameModel
+    converged: bool = True
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
     """Noise with a memory that was learned; None where white noise was taken."""
     carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
@@ -114,21 +117,6 @@ class NavigationFit(Fit):
         return self.frame_model.place[len(self.names) - count :]
 
     @property
-    def last(self) -> Pass:
-        """The last pass."""
-        return self.solution.last
-
-    @property
-    def passes(self) -> int:
-        """Number of passes."""
-        return self.solution.passes
-
-    @property
-    def converged(self) -> bool:
-        """Whether the passes stood still at the end."""
-        return self.solution.converged
-
-    @property
     def values(self) -> Floats:
         """Coefficients (SI) in `body_frame`, shape (p,)."""
         return self.reported_values(self.settled)
@@ -160,10 +148,9 @@ class NavigationFit(Fit):
         begin = StartPoint(np.ascontiguousarray(C_nb), self.estimate)
         alignment = first_attitude(prepared.epochs, prepared.phases, self.setup)
         alignment = alignment.with_azimuth_of(C_nb) if self.azimuth_free else alignment
-        solution = solve_passes(self.setup, prepared, alignment, begin, silent)
-        return replace(
-            self, setup=solution.setup, prepared=prepared, alignment=alignment, solution=solution, noise=None
-        )
+        found = solve_passes(self.setup, prepared, alignment, begin, silent)
+        own = replace(self, setup=found.setup, last=found.last, passes=found.passes, converged=found.converged)
+        return replace(own, prepared=prepared, alignment=alignment, noise=None)
 
     @property
     def estimate(self) -> Floats:
@@ -388,7 +375,7 @@ class NavigationFit(Fit):
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found, and those held out; name an azimuth that is not observable."""
-        heading = NO_AZIMUTH if self.azimuth_free else azimuth_note(self.solution)
+        heading = NO_AZIMUTH if self.azimuth_free else azimuth_note(self.setup, self.last)
         return (*self.notes_on_data(), *((heading,) if heading else ()))
 
     def notes_on_data(self) -> tuple[str, ...]:
@@ -439,7 +426,7 @@ class NavigationFit(Fit):
         # Noise that was learned explains what a stop leaves in white noise.
         worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
         more = (*([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
-        azimuth = "" if self.azimuth_free else azimuth_warning(self.solution)
+        azimuth = "" if self.azimuth_free else azimuth_warning(self.setup, self.prepared, self.last)
         return (*out, *more, *([azimuth] if azimuth else []))
 
     def beyond_specification(self) -> list[str]:

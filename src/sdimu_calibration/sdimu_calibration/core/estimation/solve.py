@@ -41,7 +41,7 @@ from sdimu_calibration.core.estimation.noise_learning import noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
-from sdimu_calibration.core.filter.solution import Solution, attitude_about
+from sdimu_calibration.core.filter.solution import attitude_about
 from sdimu_calibration.core.filter.solution import solve as solve_passes
 from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.progress import Progress, silent
@@ -200,12 +200,24 @@ def _setup(test: PreparedTest, model: Model) -> TestSetup:
     return set_up(test.site, test.imu, model, test.epoch_s(model.settle_s))
 
 
-def _prepared(test: PreparedTest, model: Model, progress: Progress) -> tuple[TestSetup, PreparedData]:
-    """Bring the samples to epochs; the setup then has the noise of these."""
+def _begun(
+    test: PreparedTest, model: Model, progress: Progress, azimuth_free: bool = False, turns: bool = True
+) -> tuple[TestSetup, PreparedData, Alignment, AccelerometerFrameModel]:
+    """Bring the samples to epochs and the model into its frame, what serves behind it; the setup has both.
+
+    `azimuth_free` and `turns` as for `solve`.
+    """
     setup = _setup(test, model)
     progress("reduce", 0.0)
     prepared = test.data(setup)
-    return weighed_for(setup, prepared), prepared
+    setup = weighed_for(setup, prepared)
+    frame = model.body_frame
+    found = model_in_frame(setup.sensors, setup.imu, frame) if turns else as_asked(setup.sensors, frame)
+    inner = with_any_direction(found.inner, setup.site.latitude_rad) if azimuth_free else found.inner
+    # What the site says of itself that it is not certain of.
+    inner = with_references(inner, stated_references(setup.site))
+    alignment = first_attitude(prepared.epochs, prepared.phases, setup)
+    return replace(setup, sensors=inner), prepared, alignment, replace(found, inner=inner)
 
 
 def _filter(
@@ -217,39 +229,27 @@ def _filter(
     turns: bool = True,
 ) -> Fit:
     """Fit by passes; `azimuth_free` and `turns` as for `solve`."""
-    setup, prepared = _prepared(test, model, progress)
-    frame_model = _framed(setup, azimuth_free, turns)
-    inner = replace(setup, sensors=frame_model.inner)
-    alignment = first_attitude(prepared.epochs, prepared.phases, inner)
+    setup, prepared, alignment, frame_model = _begun(test, model, progress, azimuth_free, turns)
     begin = None
     if start is not None:
-        begin = StartPoint(start.C_nb.copy(), start.coefficients_of(inner.sensors.names))
+        begin = StartPoint(start.C_nb.copy(), start.coefficients_of(setup.sensors.names))
     if azimuth_free:
-        alignment = alignment.with_azimuth_of((begin or coarse_start(prepared, inner, alignment)).C_nb)
-    solution = solve_passes(inner, prepared, alignment, begin, progress)
-    return NavigationFit(test, model, setup.sensors, solution.setup, prepared, alignment, solution, frame_model)
-
-
-def _framed(setup: TestSetup, azimuth_free: bool = False, turns: bool = True) -> AccelerometerFrameModel:
-    """Put the model of a setup into its frame, what serves behind it: an Earth rate of any direction, the site."""
-    frame = setup.model.body_frame
-    found = model_in_frame(setup.sensors, setup.imu, frame) if turns else as_asked(setup.sensors, frame)
-    inner = with_any_direction(found.inner, setup.site.latitude_rad) if azimuth_free else found.inner
-    # What the site says of itself that it is not certain of.
-    return replace(found, inner=with_references(inner, stated_references(setup.site)))
+        alignment = alignment.with_azimuth_of((begin or coarse_start(prepared, setup, alignment)).C_nb)
+    found = solve_passes(setup, prepared, alignment, begin, progress)
+    passes = found.last, found.passes
+    return NavigationFit(
+        test, model, frame_model.asked, found.setup, prepared, alignment, *passes, frame_model, found.converged
+    )
 
 
 def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Progress) -> Fit:
-    setup, prepared = _prepared(test, model, progress)
-    alignment = first_attitude(prepared.epochs, prepared.phases, setup)
-    frame_model = model_in_frame(setup.sensors, setup.imu, model.body_frame)
-    inner = replace(setup, sensors=frame_model.inner)
-    found = solve_batch(prepared, inner, alignment, progress)
+    setup, prepared, alignment, frame_model = _begun(test, model, progress)
+    found = solve_batch(prepared, setup, alignment, progress)
     values = frame_model.values(found.coefficients)
     covariance = frame_model.covariance(found.covariance, found.coefficients)
     summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
-    about = _navigation_about(test, model, inner, prepared, alignment, frame_model, found.C_nb[0], found.coefficients)
-    return BatchFit(test, model, setup.sensors, values, covariance, summary, about)
+    about = _navigation_about(test, model, setup, prepared, alignment, frame_model, found.C_nb[0], found.coefficients)
+    return BatchFit(test, model, about.sensors, values, covariance, summary, about)
 
 
 def fit_about(
@@ -265,12 +265,10 @@ def fit_about(
         Gives the attitude at the start where it is known. Of a fit without an azimuth it also gives the Earth rate in
         its place, and this fit does without one, too.
     """
-    setup, prepared = _prepared(test, model, silent)
-    alignment = first_attitude(prepared.epochs, prepared.phases, setup)
     here = {} if start is None else dict(zip(start.names, start.coefficients.tolist(), strict=True))
     azimuth_free = here.keys() >= set(EARTH_RATE)
-    frame_model = _framed(setup, azimuth_free)
-    sensors = frame_model.inner
+    setup, prepared, alignment, frame_model = _begun(test, model, silent, azimuth_free)
+    sensors = setup.sensors
     C_nb = alignment.C_nb if start is None else start.C_nb
     known_here = dict(coefficients)
     if azimuth_free:
@@ -281,7 +279,7 @@ def fit_about(
     if start is None:
         C_nb = attitude_about(prepared, known, alignment, C_nb, values)
     fit = _navigation_about(test, model, known, prepared, alignment, frame_model, C_nb, values)
-    return replace(fit, setup=replace(setup, sensors=sensors))
+    return replace(fit, setup=setup)
 
 
 def _navigation_about(
@@ -298,8 +296,7 @@ def _navigation_about(
     first = one_pass(prepared, setup, alignment, C_nb, coefficients)
     last = one_pass(prepared, setup, alignment, first.smoothed_start, coefficients)
     last.state.x[NAV : NAV + len(coefficients)] = 0.0
-    solution = Solution(setup, prepared, alignment, last, 2, converged=True)
-    return NavigationFit(test, model, frame_model.asked, setup, prepared, alignment, solution, frame_model)
+    return NavigationFit(test, model, frame_model.asked, setup, prepared, alignment, last, 2, frame_model)
 
 
 ESTIMATORS: Mapping[str, Callable[[PreparedTest, Model, Start | None, Progress], Fit]] = {

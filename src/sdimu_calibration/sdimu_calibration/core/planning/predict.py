@@ -21,7 +21,6 @@ from sdimu_calibration.core.estimation.navigation_fit import NavigationFit
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
-from sdimu_calibration.core.filter.solution import Solution
 from sdimu_calibration.core.plan import Plan
 from sdimu_calibration.core.planning.noise_set import NoiseSet, apply
 from sdimu_calibration.core.planning.nominal import nominal_recording
@@ -155,10 +154,9 @@ def predict(
     terms = () if noise is not None else stated_noise(imu)
     in_noise = sigma
     if terms:
-        solution = Solution(setup, nominal.prepared, nominal.start, done, 1, converged=True)
         test = PreparedTest(nominal.recording, imu, site)
         fit = NavigationFit(
-            test, model, sensors, setup, nominal.prepared, nominal.start, solution, as_asked(sensors, frame)
+            test, model, sensors, setup, nominal.prepared, nominal.start, done, 1, as_asked(sensors, frame)
         )
         in_noise = np.sqrt(np.diag(J @ covariance_in(fit, terms) @ J.T))
     limit = np.full(len(sigma), np.nan)
