@@ -23,13 +23,13 @@ import numpy as np  # noqa: E402
 
 from sdimu_calibration.core.data.axes_and_units import Stated  # noqa: E402
 from sdimu_calibration.core.diagnosis.diagnose import climb  # noqa: E402
-from sdimu_calibration.core.estimation import free_inertial  # noqa: E402
 from sdimu_calibration.core.estimation.solve import solve  # noqa: E402
 from sdimu_calibration.core.evidence.signatures import Epochs, Regressors, constant_signatures, signatures  # noqa: E402
 from sdimu_calibration.core.filter import filter_pass  # noqa: E402
 from sdimu_calibration.core.filter.filter_pass import COPY, MEASURED, NAV, PassState, new_output  # noqa: E402
 from sdimu_calibration.core.filter.kalman import update  # noqa: E402
 from sdimu_calibration.core.live import LiveCalibration  # noqa: E402
+from sdimu_calibration.core.navigation import strapdown  # noqa: E402
 from sdimu_calibration.core.plan import Plan, Turn  # noqa: E402
 from sdimu_calibration.core.units import STANDARD_GRAVITY  # noqa: E402
 from sdimu_calibration.storage.bags.bag_reader import read_recording  # noqa: E402
@@ -81,8 +81,7 @@ def without_a_pass() -> None:
     seen = SimpleNamespace(t=one, C_nb=np.zeros((1, 3, 3)), f=zeros, dt=one)
     signatures(seen, epochs, output, Regressors(np.zeros((1, 1)), few, few), 0.0, None, np.zeros((2, 2), order="F"))
     constant_signatures(seen, epochs, output, one, one, 0.0, None, np.zeros((2, 6), order="F"))
-    steps = free_inertial._Steps(zeros, zeros, zeros, zeros, one)
-    free_inertial._navigate(np.eye(3), np.zeros(3), steps, few, 0.0)
+    strapdown._navigate(np.eye(3), strapdown.Steps(zeros, zeros, zeros, zeros, one), 0.0, 0.0, 0.0, level=True)
     raw_test(np.zeros(0, np.uint8), 0)
 
 

@@ -22,7 +22,6 @@ MANY_ARGUMENTS: dict[Place, str] = {
     ("sdimu_calibration/api/functions.py", "open"): "keyword arguments of doc/python.md",
     ("sdimu_calibration/api/functions.py", "plan"): "keyword arguments of doc/python.md",
     ("sdimu_calibration/report/page.py", "write_report"): "keyword arguments of doc/report.md",
-    ("sdimu_calibration/core/batch/preintegration.py", "_navigate"): "compiled: arrays, not objects",
     ("sdimu_calibration/core/data/resting_cycles.py", "_join"): "compiled",
     ("sdimu_calibration/core/filter/filter_pass.py", "_navigate_epoch"): "compiled",
     ("sdimu_calibration/core/navigation/track.py", "_seen"): "compiled",

@@ -70,7 +70,7 @@ from sdimu_calibration.core.filter import filter_pass, kalman
 from sdimu_calibration.storage.files import journal_walk
 loops = [signatures._signatures, signatures._constant_signatures, journal_walk._walk]
 loops += [filter_pass._measurement, filter_pass._feed_back, filter_pass._write, kalman.update]
-loops.append(kernels["free_inertial"]._navigate)
+loops.append(kernels["strapdown"]._navigate)
 kernels["parts_of_the_pass"]()
 kernels["without_a_pass"]()
 called = [len(loop.signatures) for loop in loops]

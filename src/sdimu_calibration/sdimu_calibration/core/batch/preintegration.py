@@ -8,16 +8,15 @@ Odometry", IEEE Trans. Robotics 33 (2017); here with Earth rate, Coriolis force 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.data.gaps import GAP_SHARE
-from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
+from sdimu_calibration.core.navigation.strapdown import Cycles, navigate
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 
 
@@ -40,53 +39,16 @@ class Preintegration:
     """Covariance of attitude, velocity and position from white sensor noise, shape (9, 9)."""
 
 
-@compiled
-def _navigate(
-    C_nb: Floats,
-    dt: Floats,
-    alpha: Floats,
-    upsilon: Floats,
-    coning: Floats,
-    sculling: Floats,
-    latitude: float,
-    height: float,
-    gravity_excess: float,
-) -> tuple[Floats, Floats]:
-    """Attitude before each cycle and after the last (n + 1, 3, 3); velocity and displacement at the end (6,)."""
-    n = dt.shape[0]
-    track = np.empty((n + 1, 3, 3))
-    velocity = np.zeros(3)
-    position = np.zeros(3)
-    position[0], position[2] = latitude, height
-    for k in range(n):
-        track[k] = C_nb
-        dv = velocity_increment(alpha[k], upsilon[k], sculling[k])
-        gravity = earth.normal_gravity(position[0], position[2]) + gravity_excess
-        navigate_cycle(C_nb, velocity, position, alpha[k] + coning[k], dv, dt[k], gravity)
-    track[n] = C_nb
-    r_n, r_e = earth.radii(latitude)
-    moved = np.empty(6)
-    moved[:3] = velocity
-    moved[3] = (position[0] - latitude) * (r_n + height)
-    moved[4] = position[1] * (r_e + height) * np.cos(min(abs(latitude), earth.POLE_LIMIT))
-    moved[5] = height - position[2]
-    return track, moved
-
-
 def _navigated(
     cycles: Cycles, setup: TestSetup, values: Floats, coefficients: Floats, C_nb: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Integrate corrected samples: what `_navigate` gives, and the velocity increments (n, 3) without their errors.
+    """Integrate corrected samples: what `navigate` gives, and the velocity increments (n, 3) without their errors.
 
     `values`: regressors of the cycles, shape (n, m); the rest as for `preintegrate`.
     """
-    latitude, height = setup.site.latitude_rad, setup.site.height_m
-    gravity_excess = setup.gravity - float(earth.normal_gravity(latitude, height))
-    c = cycles
-    error = setup.sensors.errors(values, coefficients) * c.dt[:, None]
-    alpha, upsilon = c.alpha - error[:, :3], c.upsilon - error[:, 3:]
-    track, moved = _navigate(C_nb.copy(), c.dt, alpha, upsilon, c.coning, c.sculling, latitude, height, gravity_excess)
-    return track, moved, upsilon
+    error = setup.sensors.errors(values, coefficients) * cycles.dt[:, None]
+    clean = replace(cycles, alpha=cycles.alpha - error[:, :3], upsilon=cycles.upsilon - error[:, 3:])
+    return *navigate(clean, C_nb, setup.site.latitude_rad, setup.site.height_m, setup.gravity), clean.upsilon
 
 
 def arrival(
@@ -169,7 +131,7 @@ def preintegrate(
     noise += densities[1] * np.einsum("kij,klj,k->il", by_push, by_push, c.dt)
     noise[range(3), range(3)] += np.sum((GAP_SHARE * c.gap_angle) ** 2)
     seconds = float(c.dt.sum())
-    return Preintegration(track[-1], moved, seconds, whole @ turn, coefficient, noise)
+    return Preintegration(track[-1], moved[-1], seconds, whole @ turn, coefficient, noise)
 
 
 def _pulled(
@@ -231,9 +193,7 @@ def _transfers(velocity: Floats, position: Floats, left: Floats) -> tuple[Floats
     by_angle, by_push = np.zeros((n, 9, 3)), np.zeros((n, 9, 3))
     by_angle[:, 0:3], by_push[:, 3:6] = np.eye(3), np.eye(3)
     by_push[:, 6:9] = left[:, None, None] * np.eye(3)
-    for row, first in ((velocity, 3), (position, 6)):
-        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            # psi x s = -[s x] psi
-            by_angle[:, first + i, j] = row[:, k]
-            by_angle[:, first + i, k] = -row[:, j]
+    # psi x s = -[s x] psi
+    by_angle[:, 3:6] -= _crosses(velocity)
+    by_angle[:, 6:9] -= _crosses(position)
     return by_angle, by_push

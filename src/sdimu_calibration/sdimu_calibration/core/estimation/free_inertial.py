@@ -14,28 +14,22 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.alignment import align, azimuth_of
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
-from sdimu_calibration.core.arrays import Bools, Floats, Ints
-from sdimu_calibration.core.compiled import compiled
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.estimation.holdout import Segment, holdout_segments, part, unseen_segment
 from sdimu_calibration.core.evidence.information import solved
-from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
-from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
 from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_input, pass_settings
 from sdimu_calibration.core.filter.passes import motion_about, one_pass
-from sdimu_calibration.core.matrix3 import put
 from sdimu_calibration.core.measurement_kind import SENSORS, SKIP
 from sdimu_calibration.core.navigation.correct_cycles import correct_cycles, spread
-from sdimu_calibration.core.navigation.strapdown import Cycles, navigate_cycle, velocity_increment
-from sdimu_calibration.core.noise_term import NoiseTerm
+from sdimu_calibration.core.navigation.strapdown import Cycles, navigate
 from sdimu_calibration.core.rotation import rotation_vector
 from sdimu_calibration.core.side_by_side import side_by_side
 
@@ -142,11 +136,11 @@ def _run(
     prepared: PreparedData, fits: Sequence[tuple[str, NavigationFit]], reference: PassOutput, segment: Segment
 ) -> FreeInertialRun:
     seen = part(prepared, *segment.seen)
-    drifts = [free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
+    drifts = [_free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
     for name, fit in fits:
-        again = refit(fit, seen, fit.last.output.C_nb[max(segment.seen[0] - 1, 0)])
-        again = _in_learned_noise(again, fit, segment)
-        drifts.append(free_navigation(name, prepared, again, fit.setup, segment, reference))
+        again = _refit(fit, seen, fit.last.output.C_nb[max(segment.seen[0] - 1, 0)])
+        again = _in_noise(again, fit, segment.seen, segment.begin_s - segment.levelled_s, segment.end_s)
+        drifts.append(_free_navigation(name, prepared, again, fit.setup, segment, reference))
     return FreeInertialRun(segment, tuple(drifts))
 
 
@@ -181,10 +175,10 @@ def navigation_with(fit: NavigationFit, others: Sequence[OfOthers]) -> FreeInert
     """
     prepared, reference = fit.prepared, fit.known.output
     segment = unseen_segment(prepared)
-    drifts = [free_navigation(NOTHING, prepared, None, fit.setup, segment, reference)]
+    drifts = [_free_navigation(NOTHING, prepared, None, fit.setup, segment, reference)]
     for one in others:
-        seen = _in_wander(_told(fit, one), fit, segment)
-        drifts.append(free_navigation(one.model, prepared, seen, fit.setup, segment, reference))
+        seen = _in_noise(_told(fit, one), fit, (0, 0), segment.begin_s, segment.end_s)
+        drifts.append(_free_navigation(one.model, prepared, seen, fit.setup, segment, reference))
     return FreeInertialRun(segment, tuple(drifts))
 
 
@@ -202,28 +196,41 @@ def _told(fit: NavigationFit, others: OfOthers) -> Refit:
     return Refit(fit, estimate, covariance)
 
 
-def _in_wander(seen: Refit, fit: NavigationFit, segment: Segment) -> Refit:
-    """Add to the covariance what the biases of a recording wander from their mean in a segment of it."""
-    if fit.noise is None:
-        return seen
-    evidence = cast(NavigationEvidence, fit.bare).in_inner(fit.wander.inner)
-    at, none = (segment.begin_s, segment.begin_s + segment.length_s), np.zeros(len(evidence.epoch), dtype=np.bool_)
-    return replace(seen, covariance=seen.covariance + doubt_in_stretch(evidence, none, fit.wander, fit.noise.terms, at))
+def _in_noise(found: Refit, whole: NavigationFit, part: tuple[int, int], begin: float, end: float) -> Refit:
+    """Let the covariance hold in a stretch of a recording, in the noise that the fit of the whole learned.
+
+    The wander u of the biases, with signatures U and covariance K (`evidence.learned_noise`), bends a fit in white
+    noise, and the biases of the stretch are not those of the part: least squares on the rows of the part are off by
+    ``C W'U u``, the biases of the stretch by their share ``S u``, so the covariance grows by
+    ``(S - C W'U) K (S - C W'U)'``.
+
+    `part`: epochs of the fit, as a half-open range; `begin`, `end`: of the stretch (s), biases are constant over it.
+    """
+    if whole.noise is None:
+        return found
+    wander = whole.wander
+    evidence = cast(NavigationEvidence, whole.bare).in_inner(wander.inner)
+    q = len(evidence.weight)
+    rows = (evidence.epoch >= part[0]) & (evidence.epoch < part[1])
+    W = np.where(rows[:, None], evidence.W[:, :q], 0.0)
+    R = root_of(whole.noise.terms, wander.cut)
+    bent = solved(W.T @ W + np.diag(evidence.weight), wander.U.across(W) @ R)
+    apart = _biases(evidence.names[:q], wander.cut, begin, end) @ R - bent
+    return replace(found, covariance=found.covariance + apart @ apart.T)
 
 
-def _in_learned_noise(again: Refit, fit: NavigationFit, segment: Segment) -> Refit:
-    """Let the covariance of a refit hold in the segment, in the noise that the fit of the whole recording learned."""
-    if fit.noise is None:
-        return again
-    at = (segment.begin_s - segment.levelled_s, segment.begin_s + segment.length_s)
-    evidence = cast(NavigationEvidence, fit.bare).in_inner(fit.wander.inner)
-    rows = (evidence.epoch >= segment.seen[0]) & (evidence.epoch < segment.seen[1])
-    return replace(
-        again, covariance=again.covariance + doubt_in_stretch(evidence, rows, fit.wander, fit.noise.terms, at)
-    )
+def _biases(names: Sequence[str], cut: Stretches, begin: float, end: float) -> Floats:
+    """Return the map from the mean errors of all stretches to the biases in a span of time, shape (q, 6 n)."""
+    inside = np.clip(np.minimum(cut.end, end) - np.maximum(cut.start, begin), 0.0, None)
+    share = inside / inside.sum()
+    out = np.zeros((len(names), len(cut), 6))
+    for channel, name in enumerate(bias.NAMES):
+        if name in names:
+            out[names.index(name), :, channel] = share
+    return out.reshape(len(names), -1)
 
 
-def refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
+def _refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
     """Fit a part of the recording, from the fit of the whole.
 
     The coefficients move by little, so a few passes from the known ones do. Each pass leaves a share of the error of
@@ -248,19 +255,13 @@ def refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
     return Refit(own, own.estimate, own.estimate_covariance)
 
 
-def compensated(
+def _compensated(
     setup: TestSetup, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float
 ) -> Compensated:
     """Take the errors of the sensors out of all cycles, exactly.
 
-    Parameters
-    ----------
-    estimate : ndarray, shape (q,)
-        Coefficients of the estimator (SI).
-    C_start : ndarray, shape (3, 3)
-        Attitude at the start, b to n.
-    end_of_fit : float
-        Where the fit ended (s): a coefficient that fades is known there, and fades away from there.
+    `estimate`: of the estimator (SI), shape (q,); `C_start` (3, 3): attitude at the start, b to n; `end_of_fit`: where
+    the fit ended (s): a coefficient that fades is known there, and fades away from there.
     """
     sensors = setup.sensors
     constant = estimate * (sensors.decay_rate == 0.0)
@@ -277,7 +278,7 @@ def compensated(
     return Compensated(cycles, values, channel, parameter)
 
 
-def free_navigation(
+def _free_navigation(
     name: str, prepared: PreparedData, seen: Refit | None, setup: TestSetup, segment: Segment, reference: PassOutput
 ) -> Drift:
     """Navigate a segment with the coefficients of a fit, or with none.
@@ -295,15 +296,17 @@ def free_navigation(
     cycles, terms = until.cycles, None
     if seen is not None:
         end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
-        terms = compensated(seen.fit.setup, until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
+        terms = _compensated(seen.fit.setup, until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
         cycles = terms.cycles
     clean = part(replace(until, cycles=cycles), segment.first, segment.last)
     levelling = segment.start - segment.first
     border = int(clean.epochs.last[levelling - 1])
     C_start = _aligned(clean.cycles, border, setup, reference.C_nb[segment.start - 1])
-    position, velocity, C_nb = _navigated(clean.cycles, border, clean.epochs.last[levelling:], setup, C_start)
+    place = setup.site.latitude_rad, setup.site.height_m, setup.gravity
+    track, moved = navigate(clean.cycles[border:], C_start, *place, level=True)
+    ends = clean.epochs.last[levelling:] - border
     rows = slice(segment.start, segment.last)
-    azimuth = [rotation_vector(C @ R.T)[2] for C, R in zip(C_nb, reference.C_nb[rows], strict=True)]
+    azimuth = [rotation_vector(C @ R.T)[2] for C, R in zip(track[ends], reference.C_nb[rows], strict=True)]
     at_start = rotation_vector(C_start @ reference.C_nb[segment.start - 1].T)[2]
     t = prepared.epochs.end[rows] - prepared.epochs.end[segment.start - 1]
     promised = np.full(len(t), np.nan)
@@ -312,7 +315,7 @@ def free_navigation(
         terms = terms._replace(cycles=clean.cycles, values=np.ascontiguousarray(terms.values[begin:]))
         sigma_azimuth = float(reference.sigma[segment.start - 1, 8])
         promised = _promised(clean, seen, terms, levelling, C_start, sigma_azimuth)
-    return Drift(name, t, position, velocity, np.asarray(azimuth) - at_start, promised)
+    return Drift(name, t, moved[ends, 3:5], moved[ends, :2], np.asarray(azimuth) - at_start, promised)
 
 
 def _aligned(cycles: Cycles, border: int, setup: TestSetup, C_reference: Floats) -> Floats:
@@ -321,58 +324,6 @@ def _aligned(cycles: Cycles, border: int, setup: TestSetup, C_reference: Floats)
     w_mean, f_mean = (v[:border].sum(axis=0) / length for v in (cycles.alpha, cycles.upsilon))
     site = replace(setup.site, initial_azimuth_rad=azimuth_of(C_reference))
     return align(w_mean, f_mean, length, site, setup.imu).C_nb
-
-
-def _navigated(
-    cycles: Cycles, border: int, last: Ints, setup: TestSetup, C_start: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Navigate from cycle `border` on; errors of position and velocity (k, 2) and attitudes at the cycles `last`."""
-    site = setup.site
-    free = cycles[border:]
-    start = np.array([site.latitude_rad, 0.0, site.height_m])
-    excess = setup.gravity - float(earth.normal_gravity(site.latitude_rad, site.height_m))
-    steps = _Steps(
-        np.ascontiguousarray(free.alpha), np.ascontiguousarray(free.upsilon), free.coning, free.sculling, free.dt
-    )
-    place, velocity, C_nb = _navigate(C_start.copy(), start.copy(), steps, last - border, excess)
-    r_n, r_e = earth.radii(site.latitude_rad)
-    north = (place[:, 0] - start[0]) * (r_n + site.height_m)
-    east = place[:, 1] * (r_e + site.height_m) * np.cos(min(abs(site.latitude_rad), earth.POLE_LIMIT))
-    return np.column_stack([north, east]), velocity[:, :2], C_nb
-
-
-class _Steps(NamedTuple):
-    """Increments of n cycles for the compiled loop: angle, velocity, their corrections (n, 3) and length (n,)."""
-
-    alpha: Floats
-    upsilon: Floats
-    coning: Floats
-    sculling: Floats
-    dt: Floats
-
-
-@compiled
-def _navigate(
-    C_nb: Floats, position: Floats, steps: _Steps, last: Ints, gravity_excess: float
-) -> tuple[Floats, Floats, Floats]:
-    """Position (rad, rad, m), velocity and attitude after the cycles ``last - 1``; height held; starts at rest."""
-    k = last.shape[0]
-    place, speed, attitude = np.empty((k, 3)), np.empty((k, 3)), np.empty((k, 3, 3))
-    velocity = np.zeros(3)
-    height = position[2]
-    c = 0
-    for e in range(k):
-        while c < last[e]:
-            gravity = earth.normal_gravity(position[0], height) + gravity_excess
-            dv = velocity_increment(steps.alpha[c], steps.upsilon[c], steps.sculling[c])
-            turned = steps.alpha[c] + steps.coning[c]
-            navigate_cycle(C_nb, velocity, position, turned, dv, steps.dt[c], gravity)
-            velocity[2], position[2] = 0.0, height
-            c += 1
-        for i in range(3):
-            place[e, i], speed[e, i] = position[i], velocity[i]
-        put(C_nb, attitude[e], 0, 0)
-    return place, speed, attitude
 
 
 def _promised(
@@ -408,50 +359,3 @@ def _input(segment: PreparedData, kind: int, terms: Compensated, rows: slice) ->
     """Every epoch measures the same `kind`."""
     same = replace(segment, kind=np.full(len(segment.epochs), kind, dtype=np.int64))
     return pass_input(same, np.ascontiguousarray(terms.values[rows]), terms.channel, terms.parameter)
-
-
-Span = tuple[float, float]
-"""Begin and end (s)."""
-
-
-def doubt_in_stretch(
-    evidence: LinearEvidence, rows: Bools, wander: Wander, terms: Sequence[NoiseTerm], at: Span
-) -> Floats:
-    """Give the covariance that noise with a memory adds to coefficients by a part of a test, in a stretch of it.
-
-    The wander u of the biases, with signatures U and covariance K (`evidence.learned_noise`), bends a fit in white
-    noise, and the biases of the stretch are not those of the part: least squares on the rows of the part are off by
-    ``C W'U u``, the biases of the stretch by their share ``S u``, so the covariance grows by
-    ``(S - C W'U) K (S - C W'U)'``.
-
-    Parameters
-    ----------
-    evidence : LinearEvidence
-        Of the whole test in white noise, N rows and q coefficients.
-    rows : ndarray of bool, shape (N,)
-        Those of the part.
-    at : (float, float)
-        The stretch; its biases are taken as constant over it.
-
-    Returns
-    -------
-    ndarray, shape (q, q)
-        SI.
-    """
-    q = len(evidence.weight)
-    W = np.where(rows[:, None], evidence.W[:, :q], 0.0)
-    R = root_of(terms, wander.cut)
-    bent = solved(W.T @ W + np.diag(evidence.weight), wander.U.across(W) @ R)
-    apart = _biases(evidence.names[:q], wander.cut, at) @ R - bent
-    return np.asarray(apart @ apart.T)
-
-
-def _biases(names: Sequence[str], cut: Stretches, at: Span) -> Floats:
-    """Return the map from the mean errors of all stretches to the biases in a span of time, shape (q, 6 n)."""
-    inside = np.clip(np.minimum(cut.end, at[1]) - np.maximum(cut.start, at[0]), 0.0, None)
-    share = inside / inside.sum()
-    out = np.zeros((len(names), len(cut), 6))
-    for channel, name in enumerate(bias.NAMES):
-        if name in names:
-            out[names.index(name), :, channel] = share
-    return out.reshape(len(names), -1)

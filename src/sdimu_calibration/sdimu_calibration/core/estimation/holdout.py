@@ -47,6 +47,11 @@ class Segment:
     length_s: float
     """`begin_s`, `levelled_s`, `length_s`: begin of navigation, length of levelling and of navigation."""
 
+    @property
+    def end_s(self) -> float:
+        """End of navigation (s)."""
+        return self.begin_s + self.length_s
+
 
 def holdout_segments(prepared: PreparedData) -> tuple[Segment, ...]:
     """Choose what to keep from the fit: `WANTED_S` of navigation after a dwell, at the end and at the start.

@@ -12,6 +12,7 @@ the previous-sample terms that make both exact for a linear ramp of rate and for
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -291,3 +292,71 @@ def mean_attitude(C_nb: Floats, phi: Floats, out: Floats) -> None:
         out[i, 0] = a + 0.5 * u + (v * z - w * y) / 6.0
         out[i, 1] = b + 0.5 * v + (w * x - u * z) / 6.0
         out[i, 2] = c + 0.5 * w + (u * y - v * x) / 6.0
+
+
+def navigate(
+    cycles: Cycles, C_nb: Floats, latitude: float, height: float, gravity: float, level: bool = False
+) -> tuple[Floats, Floats]:
+    """Navigate freely from rest at a known point.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        Of n cycles.
+    C_nb : ndarray, shape (3, 3)
+        Attitude at the start, b to n (dimensionless).
+    latitude, height, gravity : float
+        Of the point (rad, m, m/s^2).
+    level : bool
+        Hold the height, as an altimeter would.
+
+    Returns
+    -------
+    C_nb : ndarray, shape (n + 1, 3, 3)
+        Attitude before each cycle and after the last (dimensionless).
+    moved : ndarray, shape (n + 1, 6)
+        Velocity (m/s) and displacement (m) there, N, E, D.
+    """
+    excess = gravity - float(earth.normal_gravity(latitude, height))
+    vectors = (cycles.alpha, cycles.upsilon, cycles.coning, cycles.sculling, cycles.dt)
+    steps = Steps(*(np.ascontiguousarray(v) for v in vectors))
+    return _navigate(C_nb.copy(), steps, latitude, height, excess, level)
+
+
+class Steps(NamedTuple):
+    """What a navigation takes of n cycles, contiguous: as in `Cycles`."""
+
+    alpha: Floats
+    upsilon: Floats
+    coning: Floats
+    sculling: Floats
+    """`alpha`, `upsilon`, `coning`, `sculling`: shape (n, 3)."""
+    dt: Floats
+    """Shape (n,)."""
+
+
+@compiled
+def _navigate(
+    C_nb: Floats, steps: Steps, latitude: float, height: float, gravity_excess: float, level: bool
+) -> tuple[Floats, Floats]:
+    """Attitudes and movements as of `navigate`; `C_nb` is moved to the end, in place."""
+    n = steps.dt.shape[0]
+    track, moved = np.empty((n + 1, 3, 3)), np.zeros((n + 1, 6))
+    velocity, position = np.zeros(3), np.zeros(3)
+    position[0], position[2] = latitude, height
+    r_n, r_e = earth.radii(latitude)
+    cos = np.cos(min(abs(latitude), earth.POLE_LIMIT))
+    track[0] = C_nb
+    for k in range(n):
+        dv = velocity_increment(steps.alpha[k], steps.upsilon[k], steps.sculling[k])
+        gravity = earth.normal_gravity(position[0], position[2]) + gravity_excess
+        turned = steps.alpha[k] + steps.coning[k]
+        navigate_cycle(C_nb, velocity, position, turned, dv, steps.dt[k], gravity)
+        if level:
+            velocity[2], position[2] = 0.0, height
+        track[k + 1] = C_nb
+        moved[k + 1, :3] = velocity
+        moved[k + 1, 3] = (position[0] - latitude) * (r_n + height)
+        moved[k + 1, 4] = position[1] * (r_e + height) * cos
+        moved[k + 1, 5] = height - position[2]
+    return track, moved
