@@ -12,7 +12,7 @@ def test_noise_says_which_kinds_look_the_same(diagnosis, monkeypatch):
     monkeypatch.setattr(noise_learning, "suspected", lambda _: True)
     fit = replace(diagnosis.extended)
     vars(fit)["wander"] = replace(fit.wander, learned=(NoiseTerm("accel", SHIFT, size=1e-9),))
-    (term,) = noise_learning.noise_of(fit).terms
+    (term,) = noise_learning.noise_of(fit)
     assert RANDOM_WALK in term.alike
     assert not term.is_drawn
 

@@ -119,9 +119,8 @@ def test_passes_end_where_data_and_the_turned_prior_balance(six_positions):
 
 
 def test_noise_of_next_to_no_size_moves_nothing_that_the_prior_decides(six_positions):
-    evidence = six_positions.bare
     tiny = NoiseTerm("gyro", "random walk", size=1e-15)
-    noisy = in_noise(six_positions, evidence, Wander.of(evidence), [tiny])
+    noisy = in_noise(six_positions, [tiny], Wander.of(six_positions.bare))
     sigma = np.sqrt(np.diag(six_positions.covariance))
     free = sigma > 0.0
     assert np.abs((noisy.values - six_positions.values)[free] / sigma[free]).max() < 0.1

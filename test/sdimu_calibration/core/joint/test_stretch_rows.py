@@ -24,7 +24,7 @@ def test_turns_are_trusted_as_their_noise_allows_and_dwells_as_in_white_noise():
     (member,) = unit_set(3, [short(stops=6)]).members
     fit = solve(member.open(), load_model("baseline"))
     evidence = fit.bare
-    fit = in_noise(fit, evidence, fit.wander, (GYRO, ACCEL))
+    fit = in_noise(fit, (GYRO, ACCEL))
     rows, places = stretch_rows(fit)
 
     cut = stretches(evidence.times)

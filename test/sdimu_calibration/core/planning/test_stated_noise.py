@@ -25,8 +25,7 @@ def test_the_prediction_is_the_covariance_of_a_test_in_that_noise(site, name):
     found = predict(plan, site, imu, MODEL)
     recording, _ = generate(Scenario(plan, imu, site, rate_hz=20.0, seed=3))
     fit = solve(PreparedTest(recording, imu, site), MODEL, learn=False)
-    evidence = fit.evidence()
-    real = np.sqrt(np.diag(in_noise(fit, evidence, Wander.of(evidence), stated_noise(imu)).covariance))
+    real = np.sqrt(np.diag(in_noise(fit, stated_noise(imu), Wander.of(fit.bare)).covariance))
     assert fit.names == found.names
     free = real > 1e-6 * found.prior
     # The mount and the errors of the real IMU change the geometry by degrees at most.

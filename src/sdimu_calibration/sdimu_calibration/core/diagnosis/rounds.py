@@ -213,7 +213,7 @@ def in_found_noise(request: Request, fit: Fit, terms: Sequence[NoiseTerm]) -> Fi
     """Estimate the coefficients of a fit in noise that was found."""
     if request.wander is None or not terms:
         return fit
-    return in_noise(fit, fit.bare, request.wander, terms)
+    return in_noise(fit, terms, request.wander)
 
 
 def _with_chosen(request: Request, done: Round, progress: Progress) -> Fit:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -18,7 +17,7 @@ from sdimu_calibration.core.evidence.consistency import stop_means
 from sdimu_calibration.core.evidence.held_out import predict
 from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.joint_information import Joint
-from sdimu_calibration.core.evidence.learned_noise import with_intervals
+from sdimu_calibration.core.evidence.learned_noise import NoiseInformation, with_intervals
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.wander import Modes, Wander
 from sdimu_calibration.core.noise_term import NoiseTerm
@@ -31,41 +30,19 @@ SUSPECTED_P = 0.05
 coefficient by half its sigma shows there, and one clean test in twenty only costs the time of a look."""
 
 
-@dataclass(frozen=True)
-class FoundNoise:
-    """Noise terms that the innovations of a fit ask for."""
-
-    terms: tuple[NoiseTerm, ...] = ()
-    evidence: LinearEvidence | None = None
-    """About the fit, in white noise; None where nobody looked."""
-
-    def taken_by(self, fit: F) -> F:
-        """Return the fit in this noise; as it is where there is none.
-
-        Parameters
-        ----------
-        fit : Fit
-            The one that the noise was learned from.
-        """
-        if self.evidence is None or not isinstance(fit, NavigationFit):
-            return fit
-        return in_noise(fit, self.evidence, fit.wander, self.terms)
-
-
-def noise_of(fit: Fit) -> FoundNoise:
-    """Learn the noise of a fit where its innovations contradict white noise.
+def noise_of(fit: Fit) -> tuple[NoiseTerm, ...]:
+    """Learn the noise of a fit where its innovations contradict white noise; none where they do not.
 
     Only a fit that navigates by its own passes learns noise; a handheld one learns scatter instead.
     """
     if not isinstance(fit, NavigationFit) or not suspected(fit):
-        return FoundNoise()
+        return ()
     wander = fit.wander
-    evidence = fit.bare.in_inner(wander.inner)
-    information = Joint.of(evidence, wander).on_wander(evidence.model, evidence.weight)
-    cut, terms = wander.cut, wander.learned
+    information = _information(fit, wander)
+    terms = wander.learned
     if terms is None:
-        terms = likely_noise(information, cut, evidence.imu)
-    return FoundNoise(with_intervals(information, cut, terms), evidence)
+        terms = likely_noise(information, wander.cut, fit.bare.imu)
+    return with_intervals(information, wander.cut, terms)
 
 
 def suspected(fit: NavigationFit) -> bool:
@@ -76,35 +53,38 @@ def suspected(fit: NavigationFit) -> bool:
     return chi2_tail(float(means @ means), len(means)) < SUSPECTED_P
 
 
-def in_noise(fit: F, evidence: LinearEvidence, wander: Wander, terms: Sequence[NoiseTerm], held_out: bool = True) -> F:
+def in_noise(fit: F, terms: Sequence[NoiseTerm], wander: Wander | None = None, held_out: bool = True) -> F:
     """Estimate the coefficients of a fit again, in noise of these terms; without terms the fit is in white noise.
 
     Parameters
     ----------
     fit : Fit
-        That navigates.
-    evidence : LinearEvidence
-        About the fit, in white noise; candidates are not looked at.
+        As it is where it does not navigate.
+    wander : Wander, optional
+        Of the fit; by default in the stretches that its own noise asks for.
     held_out : bool
         Predict the stops; without it their error in this noise is NaN.
     """
     if not isinstance(fit, NavigationFit):
         return fit
-    evidence = evidence.in_inner(wander.inner)
     if not terms:
         return fit.with_noise(None)
-    bare, modes = evidence.only(np.empty(0, dtype=np.int64)), wander.modes(terms)
+    wander = wander or fit.wander
+    bare, modes = fit.bare.in_inner(wander.inner), wander.modes(terms)
     noisy = bare.with_noise(modes.columns)
     deviation, covariance = _with_mean(bare, modes, fit.setup.sensors)
     residual = noisy.e - noisy.W @ noisy.information.estimate(noisy.model, noisy.weight)[0]
     squared = float(residual @ noisy.weighed(residual[:, None])[:, 0])
     rms = predict(noisy, noisy.model, noisy.weight, noisy.shift).rms if held_out else float("nan")
-    information = Joint.of(bare, wander).on_wander(evidence.model, evidence.weight)
-    gain = information.gain(terms, wander.cut)
-    estimate = NoiseEstimate(
-        tuple(terms), deviation, covariance, gain, squared / max(1, len(residual) - len(deviation)), rms
-    )
-    return fit.with_noise(estimate)
+    gain = _information(fit, wander).gain(terms, wander.cut)
+    nis = squared / max(1, len(residual) - len(deviation))
+    return fit.with_noise(NoiseEstimate(tuple(terms), deviation, covariance, gain, nis, rms))
+
+
+def _information(fit: NavigationFit, wander: Wander) -> NoiseInformation:
+    """Bring together what the rows of a fit say of noise, its coefficients estimated along."""
+    bare = fit.bare.in_inner(wander.inner)
+    return Joint.of(bare, wander).on_wander(bare.model, bare.weight)
 
 
 def _with_mean(evidence: LinearEvidence, modes: Modes, sensors: ImuModel) -> tuple[Floats, Floats]:

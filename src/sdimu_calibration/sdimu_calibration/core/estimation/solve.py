@@ -37,7 +37,7 @@ from sdimu_calibration.core.estimation.free_azimuth import azimuth_is_lost
 from sdimu_calibration.core.estimation.handheld_fit import HandheldFit
 from sdimu_calibration.core.estimation.handheld_solve import solve_handheld
 from sdimu_calibration.core.estimation.navigation_fit import FILTER, NavigationFit
-from sdimu_calibration.core.estimation.noise_learning import noise_of
+from sdimu_calibration.core.estimation.noise_learning import in_noise, noise_of
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
@@ -97,17 +97,17 @@ def solve(
         fit = replace(make(test, model, start, progress), reason=choice.reason)
         if not learn:
             return fit
-        found = noise_of(fit)
+        terms = noise_of(fit)
     except DivergedError as error:
         raise DivergedError(f"{error}{_likely_cause(test, model)}") from error
     except np.linalg.LinAlgError as error:
         # Innovations of a hundred sigma: their squares leave the information on noise no digits.
         raise DivergedError(f"{_NO_NOISE}{_likely_cause(test, model)}") from error
-    if found.terms and isinstance(fit, NavigationFit) and azimuth_is_lost(fit, found.terms):
+    if azimuth_is_lost(fit, terms):
         # Without a start: the fit is then the same whichever fit came before it.
         fit = replace(_filter(test, model, None, progress, azimuth_free=True, turns=turns), reason=_HIDDEN)
-        found = noise_of(fit)
-    return found.taken_by(fit)
+        terms = noise_of(fit)
+    return in_noise(fit, terms) if terms else fit
 
 
 def _likely_cause(test: PreparedTest, model: Model) -> str:

@@ -205,10 +205,10 @@ def _fitted(job: Job, test: PreparedTest) -> Fit:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
     fit = fit_about(test, model, _untagged(job.about, job.member.name), job.start)
-    if job.noise is None:
-        return fit if job.function else noise_of(fit).taken_by(fit)
-    evidence = fit.bare
-    return in_noise(fit, evidence, wander_in(evidence, job.noise), job.noise, held_out=False) if job.noise else fit
+    if job.noise:
+        return in_noise(fit, job.noise, wander_in(fit.bare, job.noise), held_out=False)
+    learned = noise_of(fit) if job.noise is None and not job.function else ()
+    return in_noise(fit, learned) if learned else fit
 
 
 def _of_all(effects: Sequence[str | Effect], job: Job) -> tuple[str, ...]:

@@ -18,5 +18,4 @@ def covariance_in(fit: NavigationFit, terms: tuple[NoiseTerm, ...]) -> Floats:
 
     Shape (p, p), in the frame of the prior (SI).
     """
-    evidence = fit.bare
-    return in_noise(fit, evidence, wander_in(evidence, terms), terms).settled_covariance
+    return in_noise(fit, terms, wander_in(fit.bare, terms)).settled_covariance
