@@ -77,9 +77,8 @@ def unseen_segment(prepared: PreparedData) -> Segment:
     """
     ready, level = _ready(prepared)
     if ready.any():
-        at, end = int(np.argmax(ready)), prepared.epochs.end
-        last = int(np.searchsorted(end, end[at] + WANTED_S + 1e-6, side="right"))
-        segment = _segment("start", prepared, _level_from(prepared, at, level), at, last, (0, at + 1))
+        at = int(np.argmax(ready))
+        segment = _segment("start", prepared, level, at, (0, at + 1))
         if segment is not None:
             return segment
     raise DataError(f"the recording is too short to navigate {LEAST_S:.0f} s after a dwell")
@@ -104,9 +103,7 @@ def _at_end(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | No
     if not fits.any():
         return None
     at = int(late[-1] if len(late) else np.flatnonzero(fits)[0])
-    last = int(np.searchsorted(end, end[at] + WANTED_S + 1e-6, side="right"))
-    first = _level_from(prepared, at, level)
-    return _segment("end", prepared, first, at, last, (0, first))
+    return _segment("end", prepared, level, at, (0, _level_from(prepared, level, at)))
 
 
 def _at_start(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | None:
@@ -122,19 +119,20 @@ def _at_start(prepared: PreparedData, ready: Bools, level: Floats) -> Segment | 
         return None
     after = np.flatnonzero(epochs.start[resumes] >= epochs.end[at] + WANTED_S - 1e-6)
     resume = int(resumes[after[0]] if len(after) else resumes[-1])
-    last = min(resume, int(np.searchsorted(epochs.end, epochs.end[at] + WANTED_S + 1e-6, side="right")))
-    return _segment("start", prepared, _level_from(prepared, at, level), at, last, (resume, len(epochs)))
+    return _segment("start", prepared, level, at, (resume, len(epochs)))
 
 
-def _level_from(prepared: PreparedData, at: int, level: Floats) -> int:
-    """First epoch that levels, of a navigation that begins after the epoch `at`; `level` (e,) in s."""
+def _level_from(prepared: PreparedData, level: Floats, at: int) -> int:
+    """First epoch that levels, of a navigation that begins after the epoch `at`."""
     return int(np.searchsorted(prepared.epochs.start, prepared.epochs.end[at] - level[at] - 1e-6))
 
 
-def _segment(
-    place: str, prepared: PreparedData, first: int, at: int, last: int, seen: tuple[int, int]
-) -> Segment | None:
-    epochs = prepared.epochs
+def _segment(place: str, prepared: PreparedData, level: Floats, at: int, seen: tuple[int, int]) -> Segment | None:
+    """Segment of `WANTED_S` or what there is beside the epochs of the fit, navigated after the epoch `at`."""
+    epochs, first = prepared.epochs, _level_from(prepared, level, at)
+    last = int(np.searchsorted(epochs.end, epochs.end[at] + WANTED_S + 1e-6, side="right"))
+    if seen[0] > at:
+        last = min(last, seen[0])
     begin = float(epochs.end[at])
     length = float(epochs.end[last - 1]) - begin
     if length < LEAST_S:

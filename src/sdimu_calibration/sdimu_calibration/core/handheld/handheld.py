@@ -60,10 +60,10 @@ class PreparedRun:
     recording: Recording
     rests: StaticIntervals
     run: HandheldRun
-    impossible: tuple[DataFault, ...]
-    """What was taken out."""
     notes: tuple[str, ...] = ()
     """Which rests tremble, and which were left out."""
+    impossible: tuple[DataFault, ...] = ()
+    """What was taken out."""
 
 
 _NOTHING = Told()
@@ -79,13 +79,13 @@ def prepare_run(
         rests = stated_rests(recording, told.rests or dwells, by_user=bool(told.rests))
         rests = without_spans(recording, rests, told.excluded)
         note = f"{len(rests)} rests as {'stated' if told.rests else 'the phase of the recording says'}"
-        chosen = ChosenRests(rests, reduce_run(recording, rests), (note,))
+        ready = PreparedRun(recording, rests, reduce_run(recording, rests), (note,))
     else:
-        chosen = choose_rests(recording, imu, site, told.excluded)
-    if len(chosen.rests) < FEWEST_RESTS:
-        raise DataError(_too_few(recording, len(chosen.rests), told))
-    run = with_whole_turns(chosen.run, told.whole_sigma) if told.whole_sigma else chosen.run
-    return PreparedRun(recording, chosen.rests, run, impossible, chosen.notes)
+        ready = _with_chosen_rests(recording, imu, site, told.excluded)
+    if len(ready.rests) < FEWEST_RESTS:
+        raise DataError(_too_few(recording, len(ready.rests), told))
+    run = _with_whole_turns(ready.run, told.whole_sigma) if told.whole_sigma else ready.run
+    return replace(ready, run=run, impossible=impossible)
 
 
 def _too_few(recording: Recording, count: int, told: Told) -> str:
@@ -188,7 +188,7 @@ def whole_turns(run: HandheldRun) -> Ints:
     return np.array(found, dtype=np.int64)
 
 
-def with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
+def _with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
     """Return a run whose whole turns are known to be such. `sigma`: how well the IMU was put back (rad, one sigma)."""
     found = whole_turns(run)
     if not len(found):
@@ -208,17 +208,7 @@ _TREMBLES = 1.7
 of a whole recording is below 2."""
 
 
-@dataclass(frozen=True)
-class ChosenRests:
-    """The rests that count, and what is to be said of them."""
-
-    rests: StaticIntervals
-    run: HandheldRun
-    notes: tuple[str, ...] = ()
-    """Rests that tremble, and rests that were left out."""
-
-
-def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None, excluded: Spans = ()) -> ChosenRests:
+def _with_chosen_rests(recording: Recording, imu: ImuSpecification, site: Site | None, excluded: Spans) -> PreparedRun:
     """Find the rests with which the coefficients are known best: those that tremble too, as far as they help.
 
     Every step of the threshold of static detection gives a set of rests, and every set a fit with all linear errors and
@@ -229,16 +219,16 @@ def choose_rests(recording: Recording, imu: ImuSpecification, site: Site | None,
     `excluded`: spans of time (s) of which no rest takes anything.
     """
     sets = tuple(without_spans(recording, rests, excluded) for rests in relaxed(recording))
-    runs = [ChosenRests(rests, reduce_run(recording, rests)) for rests in sets]
+    runs = [PreparedRun(recording, rests, reduce_run(recording, rests)) for rests in sets]
     able = [one for one in runs if len(one.rests) >= FEWEST_RESTS] or runs[-1:]
     if len(able) == 1 or len(sets[0]) >= _ENOUGH:
         best = able[0]
     else:
         best = min(able, key=lambda one: _mean_sigma(one, imu, site))
-    return ChosenRests(best.rests, best.run, _notes(recording, sets, best))
+    return replace(best, notes=_notes(sets, best))
 
 
-def _mean_sigma(one: ChosenRests, imu: ImuSpecification, site: Site | None) -> float:
+def _mean_sigma(one: PreparedRun, imu: ImuSpecification, site: Site | None) -> float:
     """Mean logarithm of the sigmas of all coefficients; infinite where the rests fit no IMU."""
     sensors = imu_model.build(LINEAR_ERRORS, imu)
     wide = widest_priors(imu, sensors)
@@ -251,9 +241,9 @@ def _mean_sigma(one: ChosenRests, imu: ImuSpecification, site: Site | None) -> f
     return float(0.5 * np.mean(np.log(np.diag(found.covariance))))
 
 
-def _notes(recording: Recording, sets: tuple[StaticIntervals, ...], best: ChosenRests) -> tuple[str, ...]:
+def _notes(sets: tuple[StaticIntervals, ...], best: PreparedRun) -> tuple[str, ...]:
     """Say which rests tremble, and which ones were left out."""
-    ratio = _scatter(recording, sets[0], best.rests)
+    ratio = _scatter(best.recording, sets[0], best.rests)
     trembling = ratio[ratio > _TREMBLES]
     notes = []
     if len(trembling):
@@ -267,7 +257,7 @@ def _notes(recording: Recording, sets: tuple[StaticIntervals, ...], best: Chosen
         for a, b in zip(widest.first, widest.last, strict=True)
     ]
     if any(outside):
-        worst = _scatter(recording, sets[0], widest)[outside].max()
+        worst = _scatter(best.recording, sets[0], widest)[outside].max()
         notes.append(
             f"{counted(sum(outside), 'moment', 'moments')} at rest left out, with up to {worst:.2g} times the scatter "
             f"of the quiet rests: with them the coefficients are known less well; {Option.RESTS} states the rests"
