@@ -8,45 +8,32 @@ LINKS, OWN, COMMON = 5, 3, 4
 
 
 def random_chain(generator):
-    links = []
-    for k in range(LINKS):
-        last = k == LINKS - 1
-        steps = 0 if last else 3
-        links.append(
-            Link(
-                generator.standard_normal((6, OWN)),
-                generator.standard_normal((6, COMMON)),
-                generator.standard_normal(6),
-                generator.standard_normal((steps, OWN)),
-                generator.standard_normal((steps, OWN)),
-                generator.standard_normal((steps, COMMON)),
-                generator.standard_normal(steps),
-            )
-        )
-    return links
+    wide, last = 2 * OWN + COMMON + 1, LINKS - 1
+    return [
+        Link(generator.standard_normal((6, OWN + COMMON + 1)), generator.standard_normal((3 if k < last else 0, wide)))
+        for k in range(LINKS)
+    ]
 
 
 def dense(links):
-    width = LINKS * OWN + COMMON
-    rows, residual = [], []
+    """Rows and values of all links, side by side."""
+    rows = []
     for k, link in enumerate(links):
-        own = np.zeros((len(link.residual), width))
-        own[:, k * OWN : (k + 1) * OWN], own[:, -COMMON:] = link.own, link.common
-        step = np.zeros((len(link.step_residual), width))
-        step[:, k * OWN : (k + 1) * OWN], step[:, -COMMON:] = link.step_own, link.step_common
-        if len(step):
-            step[:, (k + 1) * OWN : (k + 2) * OWN] = link.step_next
-        rows += [own, step]
-        residual += [link.residual, link.step_residual]
-    return np.vstack(rows), np.concatenate(residual)
+        for part, own in ((link.rows, OWN), (link.step, 2 * OWN)):
+            row = np.zeros((len(part), LINKS * OWN + COMMON + 1))
+            if len(part):
+                row[:, k * OWN : k * OWN + own], row[:, -COMMON - 1 :] = part[:, :own], part[:, own:]
+            rows.append(row)
+    whole = np.vstack(rows)
+    return whole[:, :-1], whole[:, -1]
 
 
 def test_solution_covariance_and_misfit_are_those_of_dense_least_squares():
     for seed in range(5):
         links = random_chain(np.random.default_rng(seed))
         A, r = dense(links)
-        x, misfit, _, _ = np.linalg.lstsq(A, -r, rcond=None)
-        found = solve(links)
+        x, misfit, _, _ = np.linalg.lstsq(A, r, rcond=None)
+        found = solve(links, OWN)
         np.testing.assert_allclose(found.common, x[-COMMON:], atol=1e-10)
         np.testing.assert_allclose(found.links.ravel(), x[:-COMMON], atol=1e-10)
         np.testing.assert_allclose(found.covariance, np.linalg.inv(A.T @ A)[-COMMON:, -COMMON:], atol=1e-10)

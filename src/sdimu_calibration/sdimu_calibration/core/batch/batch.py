@@ -35,7 +35,6 @@ from sdimu_calibration.core.batch.batch_rows import (
     PER_STOP,
     LinearisationPoint,
     initial,
-    nothing,
     rest_residual,
     rest_weights,
     step_rows,
@@ -46,6 +45,7 @@ from sdimu_calibration.core.batch.preintegration import Preintegration, arrival,
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.navigation.track import Correction, motion
 from sdimu_calibration.core.progress import Progress
 from sdimu_calibration.core.recording import DataError
@@ -75,12 +75,8 @@ class BatchSolution:
     """Shape (p, p)."""
     C_nb: Floats
     """Attitude of every stop, shape (k, 3, 3)."""
-    chi2: float
-    """Sum of squares of all whitened rows, priors too."""
-    dof: int
-    log_evidence: float
-    """Logarithm of the probability density of the data."""
-    steps: int
+    statistics: FitStatistics
+    """Of all whitened rows, priors too; the likelihood is the probability density of the data."""
 
 
 def bound_covariance(prepared: PreparedData, setup: TestSetup, start: Alignment) -> Floats:
@@ -92,7 +88,7 @@ def bound_covariance(prepared: PreparedData, setup: TestSetup, start: Alignment)
         SI, in the frame of the prior.
     """
     point, where = _begin(prepared, setup, start.C_nb, np.zeros(len(setup.sensors.prior)))
-    return _scaled(solve(_links(prepared, setup, start, where, point)[0]), setup)[1]
+    return _scaled(solve(_links(prepared, setup, start, where, point)[0], PER_STOP), setup)[1]
 
 
 def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, progress: Progress) -> BatchSolution:
@@ -111,7 +107,7 @@ def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, prog
             taken += 1
             progress("least squares", min(0.95, 0.1 * taken))
             links, log_weight = _links(prepared, stage, start, where, point)
-            solution = solve(links)
+            solution = solve(links, PER_STOP)
             step, covariance = _scaled(solution, stage)
             if not np.isfinite(step).all() or taken > MOST_STEPS:
                 raise DataError(
@@ -123,9 +119,9 @@ def solve_batch(prepared: PreparedData, setup: TestSetup, start: Alignment, prog
             before, point = point, _moved(point, stretch * step, stretch * solution.links)
             moved = _movement(setup, before, point, covariance)
     evidence = log_weight - 0.5 * solution.chi2 - 0.5 * solution.dof * np.log(2.0 * np.pi) - solution.log_det
-    return BatchSolution(
-        point.coefficients, covariance, point.C_nb, solution.chi2, solution.dof, float(evidence), taken
-    )
+    nis, dof = solution.chi2 / max(solution.dof, 1), float(solution.dof)
+    statistics = FitStatistics(float(evidence), nis, dof, float(taken))
+    return BatchSolution(point.coefficients, covariance, point.C_nb, statistics)
 
 
 def _begin(
@@ -218,23 +214,23 @@ def _links(
         residual, by_attitude = rest_residual(setup, rest.mean[rows], slope[rows], point.C_nb[k])
         residual = residual - rest.design[rows] @ point.coefficients
         w = weights[rows]
-        own = np.zeros((6 * len(w), PER_STOP))
-        own[:, :3] = (w[:, :, None] * by_attitude).reshape(-1, 3)
-        parts = [(own, -(w[:, :, None] * rest.design[rows] * prior).reshape(-1, p), (w * residual).ravel())]
-        parts.append(still(setup, point.velocity[k], point.position[k], p))
+        resting = np.zeros((6 * len(w), PER_STOP + p + 1))
+        resting[:, :3] = (w[:, :, None] * by_attitude).reshape(-1, 3)
+        resting[:, PER_STOP:-1] = -(w[:, :, None] * rest.design[rows] * prior).reshape(-1, p)
+        resting[:, -1] = -(w * residual).ravel()
+        own = [resting, still(setup, point.velocity[k], point.position[k], p)]
         log_weight -= 3.0 * float(np.log(setup.model.velocity_sigma) + np.log(setup.model.position_sigma))
         if k == 0:
-            parts.append(initial(start, point.C_nb[0], p))
+            own.append(initial(start, point.C_nb[0], p))
             white = np.linalg.inv(np.linalg.cholesky(setup.sensors.correlation))
-            parts.append((np.zeros((p, PER_STOP)), white, white @ (point.coefficients / prior)))
+            known = -(white @ (point.coefficients / prior))[:, None]
+            own.append(np.hstack([np.zeros((p, PER_STOP)), white, known]))
             log_weight += float(np.sum(np.log(np.diag(white)))) - float(np.sum(np.log(start.filter_sigma)))
-        step = nothing(p)
+        step = np.zeros((0, 2 * PER_STOP + p + 1))
         if k < len(travels):
-            resting = dt[where.stop_last[k]] - dt[where.stop_first[k]]
-            step, weight = step_rows(travels[k], point, k, resting, prior)
+            step, weight = step_rows(travels[k], point, k, dt[where.stop_last[k]] - dt[where.stop_first[k]], prior)
             log_weight += weight
-        a, b, c = (np.concatenate(column) for column in zip(*parts, strict=True))
-        links.append(Link(a, b, c, *step))
+        links.append(Link(np.vstack(own), step))
     return links, log_weight
 
 

@@ -1,7 +1,8 @@
 """Whitened equations of the batch estimator (`batch`), stop by stop.
 
 Unknowns of a stop: small rotation (rad), velocity (m/s) and displacement (m), all in n (North, East, Down).
-Coefficients are in SI units; `prior` scales their columns to units of the prior's sigma.
+Coefficients are in SI units; `prior` scales their columns to units of the prior's sigma. Rows are those of
+`chain.Link`: unknowns, then the negative of the residual.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ def rest_residual(setup: TestSetup, mean: Floats, slope: Floats, C_nb: Floats) -
     return residual, change + slope @ change
 
 
-def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple[Floats, Floats, Floats]:
+def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> Floats:
     """Rows that hold a stop at rest at the known point.
 
     Parameters
@@ -88,16 +89,16 @@ def still(setup: TestSetup, velocity: Floats, position: Floats, p: int) -> tuple
 
     Returns
     -------
-    own, common, residual : ndarray, shapes (6, 9), (6, p), (6,)
-        As in `chain.Link`.
+    ndarray, shape (6, 9 + p + 1)
     """
     sigma = np.repeat([setup.model.velocity_sigma, setup.model.position_sigma], 3)
-    own = np.zeros((6, PER_STOP))
-    own[:, 3:] = np.diag(1.0 / sigma)
-    return own, np.zeros((6, p)), np.concatenate([velocity, position]) / sigma
+    rows = np.zeros((6, PER_STOP + p + 1))
+    rows[:, 3:PER_STOP] = np.diag(1.0 / sigma)
+    rows[:, -1] = -np.concatenate([velocity, position]) / sigma
+    return rows
 
 
-def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Floats]:
+def initial(start: Alignment, C_nb: Floats, p: int) -> Floats:
     """Rows that hold the first attitude at that of the alignment within its sigma.
 
     Parameters
@@ -109,17 +110,17 @@ def initial(start: Alignment, C_nb: Floats, p: int) -> tuple[Floats, Floats, Flo
 
     Returns
     -------
-    own, common, residual : ndarray, shapes (3, 9), (3, p), (3,)
-        As in `chain.Link`.
+    ndarray, shape (3, 9 + p + 1)
     """
-    own = np.zeros((3, PER_STOP))
-    own[:, :3] = np.diag(1.0 / start.filter_sigma)
-    return own, np.zeros((3, p)), rotation_vector(C_nb @ start.C_nb.T) / start.filter_sigma
+    rows = np.zeros((3, PER_STOP + p + 1))
+    rows[:, :3] = np.diag(1.0 / start.filter_sigma)
+    rows[:, -1] = -rotation_vector(C_nb @ start.C_nb.T) / start.filter_sigma
+    return rows
 
 
 def step_rows(
     gone: Preintegration, point: LinearisationPoint, k: int, resting: float, prior: Floats
-) -> tuple[tuple[Floats, Floats, Floats, Floats], float]:
+) -> tuple[Floats, float]:
     """Rows that couple stop k to the next by what the IMU integrated in between.
 
     Parameters
@@ -131,8 +132,7 @@ def step_rows(
 
     Returns
     -------
-    rows : tuple of ndarray, shapes (9, 9), (9, 9), (9, p), (9,)
-        `step_own`, `step_next`, `step_common`, `step_residual` of `chain.Link`.
+    rows : ndarray, shape (9, 18 + p + 1)
     log_weight : float
         Logarithm of the determinant of the whitening.
     """
@@ -149,21 +149,5 @@ def step_rows(
             point.position[k + 1] - point.position[k] - seconds * point.velocity[k] - gone.moved[3:],
         ]
     )
-    white = np.linalg.solve(L, np.hstack([own, np.eye(9), -gone.by_coefficient * prior, residual[:, None]]))
-    rows = (white[:, :9], white[:, 9:18], white[:, 18:-1], white[:, -1])
-    return rows, -float(np.sum(np.log(np.diag(L))))
-
-
-def nothing(p: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Make the empty coupling of the last stop.
-
-    Parameters
-    ----------
-    p : int
-        Number of coefficients.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (0, 9), (0, 9), (0, p), (0,)
-    """
-    return np.zeros((0, PER_STOP)), np.zeros((0, PER_STOP)), np.zeros((0, p)), np.zeros(0)
+    rows = np.hstack([own, np.eye(9), -gone.by_coefficient * prior, -residual[:, None]])
+    return np.linalg.solve(L, rows), -float(np.sum(np.log(np.diag(L))))

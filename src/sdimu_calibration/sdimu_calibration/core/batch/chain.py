@@ -18,18 +18,12 @@ from sdimu_calibration.core.arrays import Floats
 
 @dataclass(frozen=True)
 class Link:
-    """Whitened rows of one link: ``own @ y_k + common @ c + residual``, and those that couple y_k to y_(k+1)."""
+    """Whitened rows of one link, ``own @ y_k + common @ c = value``, and those that couple y_k to y_(k+1)."""
 
-    own: Floats
-    common: Floats
-    residual: Floats
-    """`own`, `common`, `residual`: rows of this link alone, shapes (r, q), (r, p), (r,)."""
-    step_own: Floats
-    step_next: Floats
-    step_common: Floats
-    step_residual: Floats
-    """`step_own`, `step_next`, `step_common`, `step_residual`: shapes (s, q), (s, q), (s, p), (s,). Rows that couple it
-    to the next link; s = 0 at the last."""
+    rows: Floats
+    """``[own, common, value]`` of this link alone, shape (r, q + p + 1)."""
+    step: Floats
+    """``[own, own of the next link, common, value]``, shape (s, 2 q + p + 1); s = 0 at the last."""
 
 
 @dataclass(frozen=True)
@@ -50,36 +44,24 @@ class Solution:
     """Sum of the logarithms of the triangular factor's diagonal."""
 
 
-def solve(links: list[Link]) -> Solution:
+def solve(links: list[Link], q: int) -> Solution:
     """Solve the chain by elimination forwards and substitution backwards.
 
     Parameters
     ----------
-    links : list of Link
-        Residuals at the linearisation point.
-
-    Returns
-    -------
-    Solution
-        Step from the linearisation point.
+    q : int
+        Number of unknowns of a link.
     """
-    q, p = links[0].own.shape[1], links[0].common.shape[1]
+    p = links[0].rows.shape[1] - 1 - q
     carry = np.zeros((0, q + p + 1))
     eliminated: list[Floats] = []
     chi2, rows, log_det = 0.0, 0, 0.0
     for k, link in enumerate(links):
-        last = k == len(links) - 1
-        rows += len(link.residual) + len(link.step_residual)
-        here = np.vstack([carry, np.hstack([link.own, link.common, -link.residual[:, None]])])
-        if last:
-            block = here
-        else:
-            block = np.vstack(
-                [
-                    np.hstack([here[:, :q], np.zeros((len(here), q)), here[:, q:]]),
-                    np.hstack([link.step_own, link.step_next, link.step_common, -link.step_residual[:, None]]),
-                ]
-            )
+        rows += len(link.rows) + len(link.step)
+        block = np.vstack([carry, link.rows])
+        if k < len(links) - 1:
+            none = np.zeros((len(block), q))
+            block = np.vstack([np.hstack([block[:, :q], none, block[:, q:]]), link.step])
         R: Floats = np.asarray(np.linalg.qr(block, mode="r"))
         eliminated.append(R[:q])
         log_det += float(np.sum(np.log(np.abs(np.diag(R[:q, :q])))))

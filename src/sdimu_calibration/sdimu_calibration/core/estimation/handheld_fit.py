@@ -109,8 +109,7 @@ class HandheldFit(Fit):
 
     def statistics(self) -> FitStatistics:
         """Marginal log-likelihood, mean squared residual over its redundancy, steps."""
-        found = self.solution
-        return FitStatistics(found.log_likelihood, found.chi2 / max(found.dof, 1.0), found.dof, float(found.steps))
+        return self.solution.statistics
 
     def held_out_rms(self) -> float | None:
         """RMS of the normalised errors of the forces at each rest, predicted from everything else."""

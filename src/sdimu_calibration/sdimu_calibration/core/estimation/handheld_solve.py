@@ -57,7 +57,7 @@ def solve_handheld(test: PreparedTest, model: Model, start: Start | None, progre
         return _fit(test, model, None, progress) if fit is None else fit
     roomy = test.with_imu(replace(test.imu, prior={**test.imu.prior, **beyond}))
     again = _fit(_told(roomy, test, free.sensors, beyond), model, None, progress)
-    if fit is not None and again.solution.log_likelihood < fit.solution.log_likelihood + GAIN:
+    if fit is not None and again.statistics().log_likelihood < fit.statistics().log_likelihood + GAIN:
         return fit
     return again
 

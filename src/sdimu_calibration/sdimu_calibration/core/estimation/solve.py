@@ -43,7 +43,6 @@ from sdimu_calibration.core.filter.filter_pass import NAV
 from sdimu_calibration.core.filter.passes import one_pass
 from sdimu_calibration.core.filter.solution import attitude_about
 from sdimu_calibration.core.filter.solution import solve as solve_passes
-from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.progress import Progress, silent
 from sdimu_calibration.core.recording import DataError, DivergedError
 from sdimu_calibration.core.specification import Model
@@ -247,9 +246,8 @@ def _batch(test: PreparedTest, model: Model, _start: Start | None, progress: Pro
     found = solve_batch(prepared, setup, alignment, progress)
     values = frame_model.values(found.coefficients)
     covariance = frame_model.covariance(found.covariance, found.coefficients)
-    summary = FitStatistics(found.log_evidence, found.chi2 / max(found.dof, 1), float(found.dof), float(found.steps))
     about = _navigation_about(test, model, setup, prepared, alignment, frame_model, found.C_nb[0], found.coefficients)
-    return BatchFit(test, model, about.sensors, values, covariance, summary, about)
+    return BatchFit(test, model, about.sensors, values, covariance, found.statistics, about)
 
 
 def fit_about(

@@ -21,6 +21,7 @@ import numpy as np
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.fit_statistics import FitStatistics
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, seen_at_rest, turns
 from sdimu_calibration.core.handheld.run_scatter import RunScatter, learned, run_scatter
 from sdimu_calibration.core.recording import DataError
@@ -89,15 +90,13 @@ class HandheldSolution:
     """Of the kept coefficients, shape (q, q)."""
     earth_sigma: Floats
     """Sigma of the Earth's rate after the fit (rad/s), shape (3,)."""
-    chi2: float
-    dof: float
-    log_likelihood: float
+    statistics: FitStatistics
+    """Marginal log-likelihood, mean squared residual over its redundancy, steps."""
     ahead: ForcesAhead
     rest_residual: Floats
     """Of the rests (SI), rates first, shape (k, 6)."""
     turn_residual: Floats
     """Of the turns (rad), shape (k - 1, 3)."""
-    steps: int
 
 
 def fit_run(
@@ -254,18 +253,15 @@ def _finish(
     # The determinant of the priors too: without it a coefficient more would count by its unit.
     log += float(np.sum(np.log(np.diag(np.linalg.inv(np.linalg.cholesky(scene.prior))))))
     log -= float(np.sum(np.log(scene.earth_sigma))) + float(np.sum(np.log(np.abs(np.diag(R)))))
-    free = 1.0 - np.sum(Q**2, axis=1)
+    chi2, dof = float(np.sum(white[measured] ** 2)), float((1.0 - np.sum(Q**2, axis=1))[measured].sum())
     return HandheldSolution(
         point=point,
         covariance=covariance[3 * k : 3 * k + q, 3 * k : 3 * k + q],
         earth_sigma=np.sqrt(np.diag(covariance)[-3:]),
-        chi2=float(np.sum(white[measured] ** 2)),
-        dof=float(free[measured].sum()),
-        log_likelihood=log - 0.5 * float(white @ white),
+        statistics=FitStatistics(log - 0.5 * float(white @ white), chi2 / max(dof, 1.0), dof, float(steps)),
         ahead=forces_ahead(Q, white, sigma, k),
         rest_residual=residual[: 6 * k].reshape(k, 6),
         turn_residual=residual[6 * k : 9 * k - 3].reshape(k - 1, 3),
-        steps=steps,
     )
 
 
