@@ -30,9 +30,14 @@ def in_noise_in_words(statistics: FitStatistics) -> str:
 
 def stated_priors(model: Model) -> tuple[str, ...]:
     """Say which coefficients are fixed, and which have a prior of their own."""
-    fixed = [one.name for one in model.priors if one.sigma == 0.0]
-    other = [one.name for one in model.priors if one.sigma > 0.0]
-    return (
-        *((f"fixed by the model, not estimated: {', '.join(fixed)}",) if fixed else ()),
-        *((f"with a prior that the model states: {', '.join(other)}",) if other else ()),
+    fixed = ", ".join(one.name for one in model.priors if one.sigma == 0.0)
+    other = ", ".join(one.name for one in model.priors if one.sigma > 0.0)
+    return said(
+        fixed and f"fixed by the model, not estimated: {fixed}",
+        other and f"with a prior that the model states: {other}",
     )
+
+
+def said(*texts: str | None) -> tuple[str, ...]:
+    """Keep what says something."""
+    return tuple(text for text in texts if text)

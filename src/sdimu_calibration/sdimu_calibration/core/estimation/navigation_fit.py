@@ -19,7 +19,7 @@ from sdimu_calibration.core.effects.accelerometer_frame import AccelerometerFram
 from sdimu_calibration.core.effects.effect import Effect, Timetable
 from sdimu_calibration.core.estimation.azimuth_words import NO_AZIMUTH, azimuth_note, azimuth_warning
 from sdimu_calibration.core.estimation.fit import NOT_CONVERGED, Fit, Start, conditions, counts_of
-from sdimu_calibration.core.estimation.fit_words import MISFIT, in_noise_in_words, stated_priors
+from sdimu_calibration.core.estimation.fit_words import MISFIT, in_noise_in_words, said, stated_priors
 from sdimu_calibration.core.estimation.free_inertial import AS_GIVEN, FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
@@ -123,13 +123,7 @@ class NavigationFit(Fit):
 
     @cached_property
     def covariance(self) -> Floats:
-        """Covariance of `values`.
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            SI.
-        """
+        """Covariance of `values`, shape (p, p)."""
         return self.reported_covariance(self.settled_covariance)
 
     @cached_property
@@ -238,15 +232,7 @@ class NavigationFit(Fit):
         return np.asarray(self._share_of_rest @ effect.regressors(self.known.seen))
 
     def with_doubt(self, doubt: Floats | None, moved: Floats | None = None) -> Self:
-        """Return the fit with another covariance that open models add.
-
-        Parameters
-        ----------
-        doubt : ndarray, shape (k, k), or None
-            As the attribute `doubt` (SI), of the first k coefficients: those behind them only serve.
-        moved : ndarray, shape (k,), or None
-            As the attribute `moved` (SI).
-        """
+        """Return the fit with another covariance that open models add; coefficients behind those of `doubt` serve."""
         more = len(self.setup.sensors.names)
         doubt = None if doubt is None else np.pad(doubt, (0, more - len(doubt)))
         moved = None if moved is None else np.pad(moved, (0, more - len(moved)))
@@ -375,20 +361,22 @@ class NavigationFit(Fit):
 
     def notes(self) -> tuple[str, ...]:
         """List the stops that were found, and those held out; name an azimuth that is not observable."""
-        heading = NO_AZIMUTH if self.azimuth_free else azimuth_note(self.setup, self.last)
-        return (*self.notes_on_data(), *((heading,) if heading else ()))
+        return said(*self.notes_on_data(), NO_AZIMUTH if self.azimuth_free else azimuth_note(self.setup, self.last))
 
     def notes_on_data(self) -> tuple[str, ...]:
         """List the stops that were found, and those held out."""
-        held = self.test.held_out
-        told = (f"stops held out of the fit: {', '.join(map(str, held))}",) if held else ()
+        held = ", ".join(map(str, self.test.held_out))
         spans = ", ".join(f"{begin:g}-{end:g}" for begin, end in self.test.excluded)
-        told = (*told, *((f"times held out of the fit (s): {spans}",) if spans else ()), *stated_priors(self.model))
-        noise = () if self.noise is None else (self.noise.note,)
         magnetic = any(effect.needs == "magnetic" for effect in self.sensors.effects)
-        field = (NO_FIELD,) if magnetic and self.setup.site.magnetic_field_t is None else ()
-        places = (r.note for r in self.references() if r.sigma)
-        return (*stops_line(self.test.recording, self.prepared), *told, *places, *noise, *field)
+        return said(
+            *stops_line(self.test.recording, self.prepared),
+            held and f"stops held out of the fit: {held}",
+            spans and f"times held out of the fit (s): {spans}",
+            *stated_priors(self.model),
+            *(r.note for r in self.references() if r.sigma),
+            None if self.noise is None else self.noise.note,
+            NO_FIELD if magnetic and self.setup.site.magnetic_field_t is None else "",
+        )
 
     def contradiction(self, statistics: FitStatistics) -> str:
         """Say that there is no fit at all; empty where there is one."""
@@ -413,21 +401,25 @@ class NavigationFit(Fit):
     def warnings(self, statistics: FitStatistics) -> tuple[str, ...]:
         """Misfit as a whole and of single stops, and coefficients outside the specification."""
         white = "" if self.noise is None else " in white noise"
-        out: list[str] = [] if self.converged else [NOT_CONVERGED]
+        misfit: str | None = None
         judged = statistics.judged(may_be_an_effect(self.noise_terms))
         if any(figure is not None and figure > MISFIT for figure in judged):
             nis, held_out = statistics.nis_mean, statistics.held_out_rms
             text = f"NIS {nis:.3f}" + ("" if held_out is None else f", held-out error {held_out:.3f}")
             told = f"the model{white} does not fit ({text}; 1 is right){in_noise_in_words(statistics)}"
             told += self._lost_in_words() + self._noise_in_words(nis)
-            out.append(Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}"))
+            misfit = Note(told, Topic.MISFIT, f"; run: {Work.DIAGNOSE}")
         elif odd := unexplained(self.noise_terms, [fault.kind for fault in self.faults], self.test.recording.notes):
-            out.append(not_of_sensors(odd))
-        # Noise that was learned explains what a stop leaves in white noise.
-        worst = "" if self.noise else stop_misfit(self.last.output.normalised, self.prepared)
-        more = (*([worst] if worst else []), *self.contradicted_priors()[:1], *self.beyond_specification()[:1])
-        azimuth = "" if self.azimuth_free else azimuth_warning(self.setup, self.prepared, self.last)
-        return (*out, *more, *([azimuth] if azimuth else []))
+            misfit = not_of_sensors(odd)
+        return said(
+            None if self.converged else NOT_CONVERGED,
+            misfit,
+            # Noise that was learned explains what a stop leaves in white noise.
+            None if self.noise else stop_misfit(self.last.output.normalised, self.prepared),
+            *self.contradicted_priors()[:1],
+            *self.beyond_specification()[:1],
+            None if self.azimuth_free else azimuth_warning(self.setup, self.prepared, self.last),
+        )
 
     def beyond_specification(self) -> list[str]:
         """Name coefficients far outside the IMU's file, one line each, the furthest first."""

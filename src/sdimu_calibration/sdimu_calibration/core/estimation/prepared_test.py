@@ -44,7 +44,8 @@ class PreparedTest:
     rests : tuple of (float, float)
         Of a run by hand: when the IMU rested (s), as stated; without any the rests are found.
     scatter : ndarray, shape (3,), optional
-        Of a run by hand: sigmas beyond white noise, as of `RunScatter.sigmas`, where other recordings tell them.
+        Of a run by hand: sigmas beyond white noise, as of `RunScatter.sigmas`, where other recordings tell them; None
+        learns them.
     origin : Origin
         What the bag and the user say of the unit; an outcome adds what the recording says.
     known_imus : callable
@@ -109,16 +110,6 @@ class PreparedTest:
     def with_imu(self, imu: ImuSpecification) -> PreparedTest:
         """Take other white noise or priors for the fits; phases and data faults stay as they were decided."""
         return replace(self, imu=imu)
-
-    def with_scatter(self, scatter: Floats | None) -> PreparedTest:
-        """Take sigmas beyond white noise for a run by hand, in place of learning them.
-
-        Parameters
-        ----------
-        scatter : ndarray, shape (3,), or None
-            As of `RunScatter.sigmas` (SI); None learns them.
-        """
-        return replace(self, scatter=scatter)
 
     def data(self, setup: TestSetup) -> PreparedData:
         """Cycles, epochs and phases for the navigation, made once."""

@@ -13,18 +13,8 @@ from sdimu_calibration.core.evidence.information import conditioned
 from sdimu_calibration.core.site_reference import Reference, found
 
 
-def site_rows(sensors: ImuModel) -> Ints:
-    """Places of the references of the site among the parameters of a model.
-
-    Parameters
-    ----------
-    sensors : ImuModel
-        q parameters.
-
-    Returns
-    -------
-    ndarray of int, shape (r,)
-    """
+def _site_rows(sensors: ImuModel) -> Ints:
+    """Places of the references of the site among the parameters of a model."""
     behind = range(len(sensors.names) - sensors.serving, len(sensors.names))
     return np.array([k for k in behind if sensors.names[k] in SITE_REFERENCES], dtype=np.int64)
 
@@ -42,7 +32,7 @@ def at_site(sensors: ImuModel, covariance: Floats) -> Floats:
     ndarray, shape (q, q)
         SI; zero in the rows of the references.
     """
-    rows = site_rows(sensors)
+    rows = _site_rows(sensors)
     return conditioned(covariance, rows) if len(rows) else covariance
 
 
@@ -58,5 +48,5 @@ def with_found(
     covariance : ndarray, shape (q, q)
         SI.
     """
-    rows, sigma = site_rows(sensors), np.sqrt(np.diag(covariance))
+    rows, sigma = _site_rows(sensors), np.sqrt(np.diag(covariance))
     return found(references, {sensors.names[k]: (float(estimate[k]), float(sigma[k])) for k in rows})

@@ -80,7 +80,7 @@ def until_nothing_moves(
     for count in range(1, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.2 + 0.05 * count))
         last = run(at, loose)
-        moved = furthest_move(last.estimate - at.coefficients, last.covariance)
+        moved = _furthest_move(last.estimate - at.coefficients, last.covariance)
         at = StartPoint(last.smoothed_start, last.estimate)
         if not loose and moved < CONVERGED:
             return last, count, True
@@ -88,21 +88,8 @@ def until_nothing_moves(
     return last, MOST_PASSES, False
 
 
-def furthest_move(step: Floats, covariance: Floats) -> float:
-    """Largest step of a coefficient that is not known.
-
-    Parameters
-    ----------
-    step : ndarray, shape (p,)
-        SI.
-    covariance : ndarray, shape (p, p)
-        SI; zero where a coefficient is known.
-
-    Returns
-    -------
-    float
-        In units of its sigma (1).
-    """
+def _furthest_move(step: Floats, covariance: Floats) -> float:
+    """Largest step (p,) of a coefficient, in its sigma (1); those that are known have a covariance of zero."""
     sigma = np.sqrt(np.diag(covariance))
     free = sigma > 0.0
     return float(np.max(np.abs(step[free]) / sigma[free], initial=0.0))

@@ -30,11 +30,10 @@ nothing."""
 
 @dataclass(frozen=True)
 class Solution:
-    """A calibration with the pass that it ended with."""
+    """Where passes ended."""
 
     setup: TestSetup
-    prepared: PreparedData
-    alignment: Alignment
+    """With priors as wide as the data ask for."""
     last: Pass
     passes: int
     """How many there were."""
@@ -54,13 +53,21 @@ def solve(
     begin : StartPoint or None
         Attitude and coefficients of the first linearisation; None finds them from all stops.
     """
-    last, count, converged = _passes(setup, prepared, start, begin, progress)
-    return _with_room(Solution(setup, prepared, start, last, count, converged), progress)
+    found = _passes(setup, prepared, start, begin, progress)
+    for _ in range(MOST_WIDENINGS):
+        # An estimate that does not stand still says nothing against a prior.
+        wider = _with_room(found, prepared) if found.converged else None
+        if wider is None:
+            break
+        begin = StartPoint(found.last.smoothed_start, found.last.estimate)
+        again = _passes(replace(found.setup, sensors=wider), prepared, start, begin, progress)
+        found = replace(again, passes=found.passes + again.passes)
+    return found
 
 
 def _passes(
     setup: TestSetup, prepared: PreparedData, start: Alignment, begin: StartPoint | None, progress: Progress
-) -> tuple[Pass, int, bool]:
+) -> Solution:
     """Make passes from `begin` or, where there is none or it leads nowhere, from what all stops say."""
     wide, firm = loosened(setup), firm_setup(setup)
 
@@ -69,40 +76,30 @@ def _passes(
 
     if begin is not None:
         try:
-            found = until_nothing_moves(run, begin, False, progress)
+            found = Solution(setup, *until_nothing_moves(run, begin, False, progress))
         except DataError:
             pass
         else:
-            if found[2]:
+            if found.converged:
                 return found
-    return until_nothing_moves(run, coarse_start(prepared, setup, start), True, progress)
+    return Solution(setup, *until_nothing_moves(run, coarse_start(prepared, setup, start), True, progress))
 
 
-def widen_contradicted_priors(
-    sensors: ImuModel, estimate: Floats, covariance: Floats, scatter: float = 1.0
-) -> ImuModel:
-    """Widen the prior of an effect that is far beyond it and that it holds back; the same object when none is.
+def _with_room(found: Solution, prepared: PreparedData) -> ImuModel | None:
+    """Widen the priors of effects that are far beyond them and that they hold back; None where there are none.
 
     A prior is a statement about the class of the sensor; one that the model states of a coefficient is taken at its
     word. Where the data contradict a prior, the estimate lies between
     the two and is wrong, and the rest of the effect goes into the other coefficients. Misalignments keep their prior:
     nothing else holds their common part, the frame of the prior.
-
-    Parameters
-    ----------
-    sensors : ImuModel
-        With p parameters.
-    estimate, covariance : ndarray, shapes (p,) and (p, p)
-        SI.
-    scatter : float
-        Scatter of the means of the innovations at stops, in that of white noise (1).
     """
+    sensors, last = found.setup.sensors, found.last
+    means = means_at_stops(last.output.innovation / last.output.innovation_sigma, prepared)[1]
+    scatter = max(1.0, float(np.sqrt(np.nanmean(means**2))))
     gauge = np.array([e.gauge for e in sensors.effects for _ in e.parameters])
-    held, data = held_back(sensors.weight, estimate, covariance, scatter)
+    held, data = held_back(sensors.weight, last.estimate, last.covariance, scatter)
     held &= ~gauge & ~sensors.restated
-    if not held.any():
-        return sensors
-    return replace(sensors, prior=np.where(held, ROOM * np.abs(data), sensors.prior))
+    return replace(sensors, prior=np.where(held, ROOM * np.abs(data), sensors.prior)) if held.any() else None
 
 
 def held_back(weight: Floats, estimate: Floats, covariance: Floats, scatter: float = 1.0) -> tuple[Bools, Floats]:
@@ -150,24 +147,6 @@ ROOM = 10.0
 MOST_WIDENINGS = 3
 """Number of times at most that priors are widened and the passes repeated: a widened prior holds nothing back, so a
 next time is for coefficients that the first ones had hidden."""
-
-
-def _with_room(found: Solution, progress: Progress) -> Solution:
-    """Repeat passes that converged with wider priors where the data contradict them."""
-    for _ in range(MOST_WIDENINGS):
-        # An estimate that does not stand still says nothing against a prior.
-        if not found.converged:
-            break
-        setup, last = found.setup, found.last
-        means = means_at_stops(last.output.innovation / last.output.innovation_sigma, found.prepared)[1]
-        scatter = max(1.0, float(np.sqrt(np.nanmean(means**2))))
-        wider = widen_contradicted_priors(setup.sensors, last.estimate, last.covariance, scatter)
-        if wider is setup.sensors:
-            break
-        setup, begin = replace(setup, sensors=wider), StartPoint(last.smoothed_start, last.estimate)
-        last, more, converged = _passes(setup, found.prepared, found.alignment, begin, progress)
-        found = replace(found, setup=setup, last=last, passes=found.passes + more, converged=converged)
-    return found
 
 
 def attitude_about(

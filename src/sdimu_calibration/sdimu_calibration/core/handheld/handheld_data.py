@@ -89,7 +89,7 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     for step in recording.clock_steps:
         cycle, error = open_angle(step, cycles)
         gap[cycle] += _ANY_TURN**2 if step.size_s > _UNSEEN_S else error**2
-    gap[clipped_cycles(recording, cycles.t)] = _ANY_TURN**2
+    gap[_clipped_cycles(recording, cycles.t)] = _ANY_TURN**2
     return HandheldRun(
         0.5 * (start[begin] + cycles.t[end - 1]),
         part[:, 0],
@@ -105,18 +105,8 @@ def reduce_run(recording: Recording, rests: StaticIntervals) -> HandheldRun:
     )
 
 
-def clipped_cycles(recording: Recording, t: Floats) -> Ints:
-    """Cycles in which a gyro stands at the end of its range: how fast the IMU turned there is not known.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        End of each cycle (s), ascending.
-
-    Returns
-    -------
-    ndarray of int, shape (m,)
-    """
+def _clipped_cycles(recording: Recording, t: Floats) -> Ints:
+    """Cycles, which end at `t` (s), in which a gyro stands at the end of its range: nobody knows its rate there."""
     clipped = np.any(at_range_end(recording)[:, :3], axis=1)
     return np.unique(np.minimum(np.searchsorted(t, recording.t[clipped] - _EPS_S), len(t) - 1))
 

@@ -200,7 +200,7 @@ def _fitted(job: Job, test: PreparedTest) -> Fit:
     model = replace(job.model, effects=(*_of_all(job.model.effects, job), *job.local))
     if job.imu is not None:
         test = test.with_imu(job.imu)
-    test = test.with_scatter(job.scatter)
+    test = replace(test, scatter=job.scatter)
     if job.about is None or test.why_handheld or job.estimator == HandheldFit.estimator:
         # A run by hand is fitted anew: its attitudes are parameters, and a least squares about others is no nearer.
         return _own(test, model, job)
