@@ -148,8 +148,7 @@ def test_responses_of_a_motion_are_its_derivatives(imu, model, site, share):
 
     def go(C: np.ndarray, c: np.ndarray):
         seen = motion(prepared.cycles, at_rest, Correction(setup.sensors, c), C_nb.copy(), setup.around(None), True)
-        values, slope = setup.sensors.regressors(seen), error_slope(setup.sensors, seen, rows, c)
-        return preintegrate(prepared, rows, setup, values, slope, c, C)
+        return preintegrate(prepared, rows, setup, seen, setup.sensors.regressors(seen), c, C)
 
     def difference(ahead, behind) -> np.ndarray:
         return np.concatenate([rotation_vector(ahead.C_nb @ behind.C_nb.T), ahead.moved - behind.moved])

@@ -41,7 +41,7 @@ from sdimu_calibration.core.batch.batch_rows import (
     still,
 )
 from sdimu_calibration.core.batch.chain import Link, Solution, solve
-from sdimu_calibration.core.batch.preintegration import Preintegration, arrival, preintegrate
+from sdimu_calibration.core.batch.preintegration import arrival, preintegrate
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.error_slope import error_slope
 from sdimu_calibration.core.effects.motion import Motion
@@ -180,21 +180,6 @@ def _motion_after(where: Layout, k: int) -> slice:
     return slice(int(where.stop_last[k]), int(where.stop_first[k + 1]))
 
 
-def _travel(
-    prepared: PreparedData,
-    setup: TestSetup,
-    where: Layout,
-    point: LinearisationPoint,
-    seen: Motion,
-    values: Floats,
-    k: int,
-) -> Preintegration:
-    """Integrate the motion from stop k to the next."""
-    rows = _motion_after(where, k)
-    slope = error_slope(setup.sensors, seen, rows, point.coefficients)
-    return preintegrate(prepared, rows, setup, values, slope, point.coefficients, point.C_nb[k])
-
-
 def _links(
     prepared: PreparedData, setup: TestSetup, start: Alignment, where: Layout, point: LinearisationPoint
 ) -> tuple[list[Link], float]:
@@ -204,8 +189,6 @@ def _links(
     values = setup.sensors.regressors(seen)
     slope = error_slope(setup.sensors, seen, where.block_first, point.coefficients)
     rest = rest_means(prepared, where, setup.sensors, values)
-    last = len(where.stop_first) - 1
-    travels = [_travel(prepared, setup, where, point, seen, values, k) for k in range(last)]
     weights = rest_weights(setup, rest.seconds)
     dt = np.concatenate([[0.0], np.cumsum(prepared.cycles.dt)])
     links, log_weight = [], float(np.sum(np.log(weights))) - float(np.sum(np.log(prior)))
@@ -227,8 +210,10 @@ def _links(
             own.append(np.hstack([np.zeros((p, PER_STOP)), white, known]))
             log_weight += float(np.sum(np.log(np.diag(white)))) - float(np.sum(np.log(start.filter_sigma)))
         step = np.zeros((0, 2 * PER_STOP + p + 1))
-        if k < len(travels):
-            step, weight = step_rows(travels[k], point, k, dt[where.stop_last[k]] - dt[where.stop_first[k]], prior)
+        if k + 1 < len(where.stop_first):
+            motion_after = _motion_after(where, k)
+            gone = preintegrate(prepared, motion_after, setup, seen, values, point.coefficients, point.C_nb[k])
+            step, weight = step_rows(gone, point, k, dt[where.stop_last[k]] - dt[where.stop_first[k]], prior)
             log_weight += weight
         links.append(Link(np.vstack(own), step))
     return links, log_weight

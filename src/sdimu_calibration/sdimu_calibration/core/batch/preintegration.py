@@ -16,6 +16,8 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.data.gaps import GAP_SHARE
+from sdimu_calibration.core.effects.error_slope import error_slope
+from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.navigation.strapdown import Cycles, navigate
 from sdimu_calibration.core.rotation import rotation_matrix, skew
 
@@ -75,8 +77,8 @@ def preintegrate(
     prepared: PreparedData,
     rows: slice,
     setup: TestSetup,
+    seen: Motion,
     values: Floats,
-    slope: Floats,
     coefficients: Floats,
     C_nb: Floats,
 ) -> Preintegration:
@@ -92,10 +94,10 @@ def preintegrate(
         Cycles of the motion.
     setup : TestSetup
         Site, gravity, white noise and the model of the sensors.
+    seen : Motion
+        Of all cycles.
     values : ndarray, shape (n, m)
         Regressors of all cycles.
-    slope : ndarray, shape (rows, 6, 6)
-        `error_slope` of the cycles of the motion.
     coefficients : ndarray, shape (p,)
         Coefficients for which the samples are corrected.
     C_nb : ndarray, shape (3, 3)
@@ -121,7 +123,7 @@ def preintegrate(
     for response in (by_angle, by_push, whole):
         _over_the_earth(response, latitude, height)
     # A sample is (1 + slope) times the truth and more, so what is taken out of it weighs 1 / (1 + slope).
-    in_n = np.zeros((len(own), 6, 6))
+    slope, in_n = error_slope(model, seen, rows, coefficients), np.zeros((len(own), 6, 6))
     in_n[:, :3, :3] = in_n[:, 3:, 3:] = still
     weight = np.concatenate([by_angle, by_push], axis=2) @ in_n @ np.linalg.inv(np.eye(6) + slope)
     coefficient = np.zeros((9, len(model.prior)))

@@ -10,19 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from sdimu_calibration.core.alignment.alignment import align, azimuth_of
 from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup, first_attitude
-from sdimu_calibration.core.arrays import Floats, Ints
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.estimation.holdout import Segment, holdout_segments, part, unseen_segment
 from sdimu_calibration.core.evidence.information import solved
 from sdimu_calibration.core.evidence.navigation_evidence import NavigationEvidence
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
+from sdimu_calibration.core.evidence.signatures import Regressors
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
 from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_input, pass_settings
@@ -89,20 +90,6 @@ class FreeInertialRun:
     def ends(self) -> tuple[Drift, ...]:
         """The drifts without those of models between the first and the last."""
         return (*self.drifts[:2], *self.drifts[2:][-1:])
-
-
-class Compensated(NamedTuple):
-    """Cycles without the sensor errors of a fit, and how they change with its coefficients.
-
-    Shapes: n cycles, m columns, q coefficients of the estimator.
-    """
-
-    cycles: Cycles
-    values: Floats
-    """Regressors of the corrected cycles (SI), shape (n, m)."""
-    channel: Ints
-    parameter: Ints
-    """`channel`, `parameter`: channel that a column changes, and the coefficient it belongs to, shape (m,)."""
 
 
 @dataclass(frozen=True)
@@ -257,8 +244,8 @@ def _refit(fit: NavigationFit, seen: PreparedData, C_nb: Floats) -> Refit:
 
 def _compensated(
     setup: TestSetup, prepared: PreparedData, estimate: Floats, C_start: Floats, end_of_fit: float
-) -> Compensated:
-    """Take the errors of the sensors out of all cycles, exactly.
+) -> tuple[Cycles, Regressors]:
+    """Take the errors of the sensors out of all cycles, exactly; also how the cycles change with the coefficients.
 
     `estimate`: of the estimator (SI), shape (q,); `C_start` (3, 3): attitude at the start, b to n; `end_of_fit`: where
     the fit ended (s): a coefficient that fades is known there, and fades away from there.
@@ -275,7 +262,7 @@ def _compensated(
         left = np.exp(-np.outer(np.abs(clean.seen.t - end_of_fit), sensors.decay_rate[parameter]))
         errors = (values * left * fading[parameter]) @ np.eye(6)[channel] * cycles.dt[:, None]
         cycles = replace(cycles, alpha=cycles.alpha - errors[:, :3], upsilon=cycles.upsilon - errors[:, 3:])
-    return Compensated(cycles, values, channel, parameter)
+    return cycles, Regressors(values, channel, parameter)
 
 
 def _free_navigation(
@@ -296,8 +283,7 @@ def _free_navigation(
     cycles, terms = until.cycles, None
     if seen is not None:
         end_of_fit = float(prepared.epochs.end[segment.seen[1] - 1])
-        terms = _compensated(seen.fit.setup, until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
-        cycles = terms.cycles
+        cycles, terms = _compensated(seen.fit.setup, until, seen.estimate, reference.C_nb[0].copy(), end_of_fit)
     clean = part(replace(until, cycles=cycles), segment.first, segment.last)
     levelling = segment.start - segment.first
     border = int(clean.epochs.last[levelling - 1])
@@ -312,7 +298,7 @@ def _free_navigation(
     promised = np.full(len(t), np.nan)
     if seen is not None and terms is not None:
         begin = int(prepared.epochs.first[segment.first])
-        terms = terms._replace(cycles=clean.cycles, values=np.ascontiguousarray(terms.values[begin:]))
+        terms = terms._replace(values=np.ascontiguousarray(terms.values[begin:]))
         sigma_azimuth = float(reference.sigma[segment.start - 1, 8])
         promised = _promised(clean, seen, terms, levelling, C_start, sigma_azimuth)
     return Drift(name, t, moved[ends, 3:5], moved[ends, :2], np.asarray(azimuth) - at_start, promised)
@@ -327,7 +313,7 @@ def _aligned(cycles: Cycles, border: int, setup: TestSetup, C_reference: Floats)
 
 
 def _promised(
-    clean: PreparedData, seen: Refit, terms: Compensated, levelling: int, C_start: Floats, sigma_azimuth: float
+    clean: PreparedData, seen: Refit, terms: Regressors, levelling: int, C_start: Floats, sigma_azimuth: float
 ) -> Floats:
     """One sigma of the horizontal distance (m) that the covariance of the refit gives at the end of each epoch, (k,).
 
@@ -355,7 +341,7 @@ def _promised(
     return np.asarray(np.hypot(out.sigma[:, 0], out.sigma[:, 1]))
 
 
-def _input(segment: PreparedData, kind: int, terms: Compensated, rows: slice) -> PassInput:
+def _input(segment: PreparedData, kind: int, terms: Regressors, rows: slice) -> PassInput:
     """Every epoch measures the same `kind`."""
     same = replace(segment, kind=np.full(len(segment.epochs), kind, dtype=np.int64))
     return pass_input(same, np.ascontiguousarray(terms.values[rows]), terms.channel, terms.parameter)

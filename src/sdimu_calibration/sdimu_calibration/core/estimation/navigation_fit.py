@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import InitVar, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -85,14 +85,7 @@ class NavigationFit(Fit):
     converged: bool = True
     noise: NoiseEstimate | None = field(default=None, kw_only=True)
     """Noise with a memory that was learned; None where white noise was taken."""
-    carried: InitVar[Mapping[str, Any] | None] = field(default=None, kw_only=True)
-    """Cached properties that a fit by the same passes knows already."""
     estimator = FILTER
-
-    def __post_init__(self, carried: Mapping[str, Any] | None) -> None:
-        """Keep what is known."""
-        for name, value in (carried or {}).items():
-            object.__setattr__(self, name, value)
 
     @property
     def azimuth_free(self) -> bool:  # type: ignore[override]
@@ -236,15 +229,17 @@ class NavigationFit(Fit):
         more = len(self.setup.sensors.names)
         doubt = None if doubt is None else np.pad(doubt, (0, more - len(doubt)))
         moved = None if moved is None else np.pad(moved, (0, more - len(moved)))
-        return replace(self, doubt=doubt, moved=moved, carried=self._of_the_passes())
+        return self._by_the_same_passes(doubt=doubt, moved=moved)
 
     def with_noise(self, noise: NoiseEstimate | None) -> Self:
         """Return the fit in other noise; None is white noise."""
-        return replace(self, noise=noise, carried=self._of_the_passes())
+        return self._by_the_same_passes(noise=noise)
 
-    def _of_the_passes(self) -> dict[str, Any]:
-        """Collect what is known of the passes by now, for a fit by the same ones."""
-        return {name: vars(self)[name] for name in _OF_THE_PASSES if name in vars(self)}
+    def _by_the_same_passes(self, **other: Any) -> Self:
+        """Return the fit with other fields that the passes do not hang on; what is known of them by now is kept."""
+        fit = replace(self, **other)
+        vars(fit).update({name: vars(self)[name] for name in _OF_THE_PASSES if name in vars(self)})
+        return fit
 
     @property
     def noise_terms(self) -> tuple[NoiseTerm, ...]:
