@@ -8,9 +8,10 @@ of gravity); N. Pavlis et al., "The development and evaluation of the Earth Grav
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.units import from_si, to_si
 
 SURVEYED, FROM_MAP, BY_FORMULA = "surveyed", "map", "formula"
@@ -88,11 +89,19 @@ def _usually_off(reference: Reference) -> str:
     return f", off by {size} (root mean square over the Earth): state gravity_m_s2, or gravity_sigma: {BY_FORMULA}"
 
 
-def found(references: Sequence[Reference], off: Mapping[str, tuple[float, float]]) -> tuple[Reference, ...]:
+def found(
+    references: Sequence[Reference], names: Sequence[str], values: Floats, sigmas: Floats
+) -> tuple[Reference, ...]:
     """Put in what a fit found.
 
-    `off`: told less true, and its sigma (SI), of those that were estimated along, by name.
+    Parameters
+    ----------
+    names : sequence of str, length r
+        Those that were estimated along.
+    values, sigmas : ndarray, shape (r,)
+        Told less true, and its sigma (SI).
     """
+    off = dict(zip(names, zip(values.tolist(), sigmas.tolist(), strict=True), strict=True))
     return tuple(
         replace(r, value=r.told - off[r.name][0], value_sigma=off[r.name][1]) if r.name in off else r
         for r in references

@@ -7,7 +7,7 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.scan import TESTABLE, scan
 from sdimu_calibration.core.effects import registry
-from sdimu_calibration.core.estimation.noise_learning import in_white_noise
+from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.estimation.prepared_test import PreparedTest
 from sdimu_calibration.core.estimation.solve import extend, solve
 from sdimu_calibration.core.evidence.navigation_evidence import columns
@@ -77,7 +77,7 @@ def test_information_of_the_signatures_is_the_covariance_of_the_filter(bench):
 
 def test_the_score_is_the_fall_of_chi_square_of_a_refit(bench):
     hidden = ("accel_quadratic_x=60 ug/g^2",)
-    fit = in_white_noise(bench.fit(effects=hidden))
+    fit = in_noise(bench.fit(effects=hidden), ())
     evidence = _evidence(bench, ["accel_quadratic"], effects=hidden)
     column = evidence.names.index("accel_quadratic_x")
     scanned = scan(evidence.information, evidence.model, evidence.weight)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from sdimu_calibration.core.data.imu_class import other_grade
 from sdimu_calibration.core.estimation.fit import Fit
-from sdimu_calibration.core.estimation.noise_learning import in_white_noise
+from sdimu_calibration.core.estimation.noise_learning import in_noise
 from sdimu_calibration.core.estimation.solve import solve
 from sdimu_calibration.core.evidence.consistency import Consistency, Noise
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, NoiseTerm
@@ -60,7 +60,7 @@ def in_measured_noise(fit: Fit, progress: Progress = silent) -> tuple[Fit, Consi
             azimuth_free=fit.azimuth_free,
         )
         fit = replace(again, reason=fit.reason)
-    return in_white_noise(fit), consistency, noise
+    return in_noise(fit, ()), consistency, noise
 
 
 def of_other_grade(noise: Sequence[str]) -> tuple[str, ...]:

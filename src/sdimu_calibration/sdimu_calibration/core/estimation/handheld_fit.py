@@ -77,10 +77,9 @@ class HandheldFit(Fit):
 
     def references(self) -> tuple[Reference, ...]:
         """List gravity and latitude of the site as told, and what the data made of gravity."""
-        model, q = self.priors.model, len(self._kept)
-        sigma = np.sqrt(np.diag(self.solution.covariance)[q:]).tolist()
-        off = zip(self.solution.point.coefficients[len(self.names) :].tolist(), sigma, strict=True)
-        return found(super().references(), dict(zip(model.names[len(self.names) :], off, strict=True)))
+        p, best = len(self.names), self.solution.point.coefficients
+        sigma = np.sqrt(np.diag(self.solution.covariance)[len(self._kept) :])
+        return found(super().references(), self.priors.model.names[p:], best[p:], sigma)
 
     def reported_values(self, settled: Floats) -> Floats:
         """Put the coefficients that are fitted among all; zero for what is pinned."""

@@ -23,7 +23,7 @@ from sdimu_calibration.core.estimation.fit_words import MISFIT, in_noise_in_word
 from sdimu_calibration.core.estimation.free_inertial import AS_GIVEN, FreeInertialRun, free_inertial_runs
 from sdimu_calibration.core.estimation.noise_estimate import NoiseEstimate, not_of_sensors
 from sdimu_calibration.core.estimation.prior_check import contradicted, outside
-from sdimu_calibration.core.estimation.site_rows import at_site, with_found
+from sdimu_calibration.core.estimation.site_rows import at_site, site_rows
 from sdimu_calibration.core.evidence.consistency import Consistency, check
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.navigation_evidence import (
@@ -49,7 +49,7 @@ from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataFault
 from sdimu_calibration.core.results import History
 from sdimu_calibration.core.side_by_side import side_by_side
-from sdimu_calibration.core.site_reference import Reference
+from sdimu_calibration.core.site_reference import Reference, found
 from sdimu_calibration.core.wording import Option, Work
 
 FILTER = "filter"
@@ -180,7 +180,9 @@ class NavigationFit(Fit):
 
     def references(self) -> tuple[Reference, ...]:
         """List latitude and gravity of the site as told, and what the data made of them."""
-        return with_found(super().references(), self.setup.sensors, self.settled, self.settled_covariance)
+        names, rows = self.setup.sensors.names, site_rows(self.setup.sensors)
+        sigma = np.sqrt(np.diag(self.settled_covariance)[rows])
+        return found(super().references(), [names[k] for k in rows], self.settled[rows], sigma)
 
     @cached_property
     def centring(self) -> Floats:

@@ -68,7 +68,7 @@ def in_noise(fit: F, terms: Sequence[NoiseTerm], wander: Wander | None = None, h
     if not isinstance(fit, NavigationFit):
         return fit
     if not terms:
-        return fit.with_noise(None)
+        return fit if fit.noise is None else fit.with_noise(None)
     wander = wander or fit.wander
     bare, modes = fit.bare.in_inner(wander.inner), wander.modes(terms)
     noisy = bare.with_noise(modes.columns)
@@ -118,8 +118,3 @@ def _with_mean(evidence: LinearEvidence, modes: Modes, sensors: ImuModel) -> tup
         for other, column in moved:
             unseen[row, column] = modes.unseen[channel, other]
     return T @ estimate, T @ covariance @ T.T + unseen
-
-
-def in_white_noise(fit: F) -> F:
-    """Return the fit as its passes left it, in white noise."""
-    return fit.with_noise(None) if isinstance(fit, NavigationFit) and fit.noise is not None else fit

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.imu_model import ImuModel
 from sdimu_calibration.core.effects.references import SITE_REFERENCES
 from sdimu_calibration.core.evidence.information import conditioned
-from sdimu_calibration.core.site_reference import Reference, found
 
 
-def _site_rows(sensors: ImuModel) -> Ints:
-    """Places of the references of the site among the parameters of a model."""
+def site_rows(sensors: ImuModel) -> Ints:
+    """Places of the references of the site among the parameters of a model, shape (r,)."""
     behind = range(len(sensors.names) - sensors.serving, len(sensors.names))
     return np.array([k for k in behind if sensors.names[k] in SITE_REFERENCES], dtype=np.int64)
 
@@ -32,21 +29,5 @@ def at_site(sensors: ImuModel, covariance: Floats) -> Floats:
     ndarray, shape (q, q)
         SI; zero in the rows of the references.
     """
-    rows = _site_rows(sensors)
+    rows = site_rows(sensors)
     return conditioned(covariance, rows) if len(rows) else covariance
-
-
-def with_found(
-    references: Sequence[Reference], sensors: ImuModel, estimate: Floats, covariance: Floats
-) -> tuple[Reference, ...]:
-    """Put into references what a fit found of those that it estimated along.
-
-    Parameters
-    ----------
-    estimate : ndarray, shape (q,)
-        SI.
-    covariance : ndarray, shape (q, q)
-        SI.
-    """
-    rows, sigma = _site_rows(sensors), np.sqrt(np.diag(covariance))
-    return found(references, {sensors.names[k]: (float(estimate[k]), float(sigma[k])) for k in rows})

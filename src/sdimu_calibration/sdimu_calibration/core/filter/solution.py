@@ -89,9 +89,9 @@ def _with_room(found: Solution, prepared: PreparedData) -> ImuModel | None:
     """Widen the priors of effects that are far beyond them and that they hold back; None where there are none.
 
     A prior is a statement about the class of the sensor; one that the model states of a coefficient is taken at its
-    word. Where the data contradict a prior, the estimate lies between
-    the two and is wrong, and the rest of the effect goes into the other coefficients. Misalignments keep their prior:
-    nothing else holds their common part, the frame of the prior.
+    word. Where the data contradict a prior, the estimate lies between the two and is wrong, and the rest of the effect
+    goes into the other coefficients. Misalignments keep their prior: nothing else holds their common part, the frame of
+    the prior.
     """
     sensors, last = found.setup.sensors, found.last
     means = means_at_stops(last.output.innovation / last.output.innovation_sigma, prepared)[1]

@@ -131,7 +131,7 @@ def _whole_note(run: HandheldRun) -> list[str]:
     if len(run.whole):
         size = np.degrees(run.whole_sigma)
         return [f"{len(run.whole)} turns are whole ones about the vertical, as stated, to {size:.2g} deg"]
-    found = whole_turns(run)
+    found = _whole_turns(run)
     if not len(found):
         return []
     return [
@@ -164,17 +164,12 @@ _UPRIGHT = 0.8
 """Least share of the way that is about the vertical: a desk under the IMU holds the axis, a hand does not."""
 
 
-def whole_turns(run: HandheldRun) -> Ints:
+def _whole_turns(run: HandheldRun) -> Ints:
     """Find the turns that may be whole ones about the vertical: which of the k - 1, shape (w,).
 
     Gravity does not show a turn about itself. Who puts the IMU back where it was, against an edge, knows that it turned
     by a multiple of 360 deg, and the gyros' scale factors follow (Ferraris, Grimaldi & Parvis, "Procedure for
     effortless in-field calibration of three-axial rate gyro and accelerometers", Sensors and Materials 7, 1995).
-
-    Parameters
-    ----------
-    run : HandheldRun
-        With k rests.
     """
     up = run.mean[:, 3:] / np.linalg.norm(run.mean[:, 3:], axis=1, keepdims=True)
     bias = np.median(run.mean[:, :3], axis=0)
@@ -190,7 +185,7 @@ def whole_turns(run: HandheldRun) -> Ints:
 
 def _with_whole_turns(run: HandheldRun, sigma: float) -> HandheldRun:
     """Return a run whose whole turns are known to be such. `sigma`: how well the IMU was put back (rad, one sigma)."""
-    found = whole_turns(run)
+    found = _whole_turns(run)
     if not len(found):
         raise DataError(
             f"/imu/data_raw: {Option.WHOLE_TURNS}: no turn about the vertical comes near a multiple of 360 deg, with "

@@ -57,7 +57,7 @@ class HandheldRun:
     sway: Sway
     """How far the IMU moves about its mean at each rest."""
     whole: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """Shape (w,). Turns that are stated to be whole ones about the vertical: `whole_turns`."""
+    """Shape (w,). Turns that are stated to be whole ones about the vertical."""
     whole_sigma: float = 0.0
     """How well the IMU was put back after them (rad, one sigma)."""
 

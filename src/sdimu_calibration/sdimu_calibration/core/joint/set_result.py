@@ -91,9 +91,8 @@ def set_outcome(fit: SetFit) -> Calibration:
         *_beyond(fit, base),
         *inseparable(names, _reported(fit, base, at_site)[1]),
     )
-    sigma = np.sqrt(np.diag(fit.estimate.covariance))
-    off = {fit.names[k]: (float(fit.estimate.values[k]), float(sigma[k])) for k in places}
-    references = found(told_of(base.test.site, names), off)
+    off, sigma = [fit.names[k] for k in places], np.sqrt(np.diag(fit.estimate.covariance)[places])
+    references = found(told_of(base.test.site, names), off, fit.estimate.values[places], sigma)
     return Calibration(
         body_frame=base.body_frame,
         model=tuple(e.key for e in base.sensors.effects),
