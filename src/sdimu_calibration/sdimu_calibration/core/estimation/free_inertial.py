@@ -24,7 +24,7 @@ from sdimu_calibration.core.evidence.navigation_evidence import NavigationEviden
 from sdimu_calibration.core.evidence.noise_kernels import Stretches
 from sdimu_calibration.core.evidence.noise_root import root_of
 from sdimu_calibration.core.evidence.signatures import Regressors
-from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassOutput, PassState, new_output, run_pass
+from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import CONVERGED
 from sdimu_calibration.core.filter.pass_setup import firm_setup, pass_input, pass_settings
 from sdimu_calibration.core.filter.passes import motion_about, one_pass
@@ -104,30 +104,28 @@ class Refit:
     navigation with what noise with a memory adds there."""
 
 
-def free_inertial_runs(
-    prepared: PreparedData, fits: Sequence[tuple[str, NavigationFit]], reference: PassOutput
-) -> tuple[FreeInertialRun, ...]:
+def free_inertial_runs(fits: Sequence[tuple[str, NavigationFit]]) -> tuple[FreeInertialRun, ...]:
     """Navigate unseen segments uncompensated and with each model, fitted to the rest of the recording.
 
     Parameters
     ----------
     fits : sequence of (str, NavigationFit)
-        Names and fits of the whole recording; each is fitted again to the rest.
-    reference : PassOutput
-        Of a fit to the whole recording: azimuth at the start, and what heading is compared with.
+        Names and fits of the whole recording; each is fitted again to the rest. A model that lacks an effect has a
+        wrong azimuth, too: all start from that of the last, which knows most.
     """
-    return tuple(side_by_side(lambda segment: _run(prepared, fits, reference, segment), holdout_segments(prepared)))
+    whole = fits[-1][1]
+    # Worked out here, or each thread would.
+    _ = whole.known
+    return tuple(side_by_side(lambda segment: _run(whole, fits, segment), holdout_segments(whole.prepared)))
 
 
-def _run(
-    prepared: PreparedData, fits: Sequence[tuple[str, NavigationFit]], reference: PassOutput, segment: Segment
-) -> FreeInertialRun:
-    seen = part(prepared, *segment.seen)
-    drifts = [_free_navigation(NOTHING, prepared, None, fits[0][1].setup, segment, reference)]
+def _run(whole: NavigationFit, fits: Sequence[tuple[str, NavigationFit]], segment: Segment) -> FreeInertialRun:
+    seen = part(whole.prepared, *segment.seen)
+    drifts = [_free_navigation(NOTHING, whole, None, segment)]
     for name, fit in fits:
         again = _refit(fit, seen, fit.last.output.C_nb[max(segment.seen[0] - 1, 0)])
         again = _in_noise(again, fit, segment.seen, segment.begin_s - segment.levelled_s, segment.end_s)
-        drifts.append(_free_navigation(name, prepared, again, fit.setup, segment, reference))
+        drifts.append(_free_navigation(name, whole, again, segment))
     return FreeInertialRun(segment, tuple(drifts))
 
 
@@ -160,12 +158,11 @@ def navigation_with(fit: NavigationFit, others: Sequence[OfOthers]) -> FreeInert
     DataError
         Where the recording is too short.
     """
-    prepared, reference = fit.prepared, fit.known.output
-    segment = unseen_segment(prepared)
-    drifts = [_free_navigation(NOTHING, prepared, None, fit.setup, segment, reference)]
+    segment = unseen_segment(fit.prepared)
+    drifts = [_free_navigation(NOTHING, fit, None, segment)]
     for one in others:
         seen = _in_noise(_told(fit, one), fit, (0, 0), segment.begin_s, segment.end_s)
-        drifts.append(_free_navigation(one.model, prepared, seen, fit.setup, segment, reference))
+        drifts.append(_free_navigation(one.model, fit, seen, segment))
     return FreeInertialRun(segment, tuple(drifts))
 
 
@@ -265,20 +262,13 @@ def _compensated(
     return cycles, Regressors(values, channel, parameter)
 
 
-def _free_navigation(
-    name: str, prepared: PreparedData, seen: Refit | None, setup: TestSetup, segment: Segment, reference: PassOutput
-) -> Drift:
-    """Navigate a segment with the coefficients of a fit, or with none.
+def _free_navigation(name: str, whole: NavigationFit, seen: Refit | None, segment: Segment) -> Drift:
+    """Navigate a segment with the coefficients of a fit to the rest of the recording; None takes samples as they are.
 
-    Parameters
-    ----------
-    prepared : PreparedData
-        Of the whole recording: some effects remember what was before the segment.
-    seen : Refit or None
-        Of the rest of the recording; None navigates with the samples as they are.
-    reference : PassOutput
-        Of a fit to the whole recording.
+    `whole`: of the whole recording, as some effects remember what was before the segment. It gives the azimuth at the
+    start, and what heading is compared with.
     """
+    prepared, setup, reference = whole.prepared, whole.setup, whole.known.output
     until = part(prepared, 0, segment.last)
     cycles, terms = until.cycles, None
     if seen is not None:

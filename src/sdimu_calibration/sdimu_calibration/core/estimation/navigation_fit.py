@@ -428,9 +428,8 @@ class NavigationFit(Fit):
 
     def free_inertial(self, rivals: Sequence[tuple[str, Fit]]) -> tuple[FreeInertialRun, ...]:
         """Navigate without aid, with this fit and with `rivals` (name, fit), on parts that no fit has seen."""
-        fits = [(AS_GIVEN, self), *((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))]
-        # A model that lacks an effect has a wrong azimuth, too: all start from that of the last, which knows most.
-        return free_inertial_runs(self.prepared, fits, fits[-1][1].known.output)
+        navigating = ((name, fit) for name, fit in rivals if isinstance(fit, NavigationFit))
+        return free_inertial_runs([(AS_GIVEN, self), *navigating])
 
     def history(self) -> History:
         """History of the last pass, at the epochs whose covariance was kept."""
