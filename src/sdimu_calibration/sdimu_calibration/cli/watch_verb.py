@@ -214,7 +214,7 @@ def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]
     Those of the catalogue are among them: an effect may be added at any time, by whoever watches.
     """
     from sdimu_calibration.core.effects import selection
-    from sdimu_calibration.core.effects.imu_model import build, prior_sigmas, prior_size
+    from sdimu_calibration.core.effects.imu_model import build, prior_sigmas, prior_sizes
     from sdimu_calibration.core.effects.registry import get, names
     from sdimu_calibration.report.live_seen import Outline
     from sdimu_calibration.storage.files.config import load_imu
@@ -228,7 +228,8 @@ def outlined(test: RunningTest | None, model: str | None, added: tuple[str, ...]
         return Outline(0.0, 0, keys, units), {}
     imu = load_imu(test.imu)
     first = prior_sigmas(build(effects, imu), chosen.body_frame)
-    later = {q.name: size for e in map(get, names()) if (size := prior_size(e, imu)) for q in e.parameters}
+    sizes = {q.name: size for e in map(get, names()) for q, size in zip(e.parameters, prior_sizes(e, imu), strict=True)}
+    later = {name: size for name, size in sizes.items() if size}
     return Outline(test.duration_s, test.stops, keys, units, test.diagnosed), {**later, **first}
 
 

@@ -222,6 +222,19 @@ def _draw(clean, rng):
     return r.label, float(size * rng.choice([-1.0, 1.0])), r.display_unit
 
 
+def test_a_sensitivity_to_force_is_as_large_as_the_mass_unbalances_that_the_file_states():
+    """Of a file with 100 deg/h/g its elements were looked for with the 50 deg/h/g of the grade."""
+    prior = {name: size for name, size in IMU.prior.items() if name != "gyro_g_sensitivity"}
+    stated = to_si(100.0, "deg/h/g")
+    imu = replace(IMU, prior={**prior, "gyro_mass_unbalance": stated})
+    model = replace(MODEL, effects=tuple(e for e in MODEL.effects if e != "gyro_g_sensitivity"))
+    fit = solve(PreparedTest(_recording(203), imu), model, "handheld")
+    evidence = fit.evidence([registry.get("gyro_g_sensitivity"), registry.get("gyro_mass_unbalance")])
+    size = dict(zip((one.label for one in evidence.candidates), evidence.prior.tolist(), strict=True))
+    assert size["gyro_g_sensitivity_xy"] == size["gyro_mass_unbalance_qx"] == stated
+    assert size["gyro_g_sensitivity_xz"] == to_si(50.0, "deg/h/g")
+
+
 def test_an_effect_that_nothing_bounds_and_nothing_shows_has_no_signature():
     """No prior in the grade of the IMU, and a regressor that is zero in this run."""
     evidence = _diagnosis(203).evidence

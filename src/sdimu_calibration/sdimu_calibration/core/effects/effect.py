@@ -130,6 +130,9 @@ class Effect:
     contained_in : str
         Registry name of a larger effect that has these terms among its own: an IMU file that states a prior of it, and
         none of this one, states it of these terms; empty: none.
+    parts : mapping of str to str
+        Of parameters that a smaller effect has by another name: its registry name. An IMU file that states a prior of
+        that one, and none of this, states it of these parameters.
     needs : str
         ``temperature``, ``magnetic`` or empty: what must be recorded or known for the effect to mean anything.
     options : mapping of str to str
@@ -174,6 +177,7 @@ class Effect:
     tried_in: Literal["recording", "set", "request"] = "recording"
     family: str = ""
     contained_in: str = ""
+    parts: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, str] = field(default_factory=dict)
     with_options: Callable[..., Effect] | None = None
     scan: Callable[[Timetable], tuple[Effect, ...]] | None = None

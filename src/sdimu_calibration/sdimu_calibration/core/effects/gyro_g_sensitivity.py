@@ -26,6 +26,7 @@ G_SENSITIVITY = register_family(
     typical="DTG spin axis 0.05-0.5, optical below 0.1, tactical 0.1-1, MEMS 1-100 deg/h/g",
     description="Drift in proportion to force along any axis. Six of nine are the mass unbalance of the baseline; "
     "those of the spin axes (xz, yz, zx) are not.",
+    parts={f"gyro_g_sensitivity_{ij}": "gyro_mass_unbalance" for ij in ("xx", "xy", "yy", "yx", "zz", "zy")},
     confused_with=("gyro_mass_unbalance",),
 )
 

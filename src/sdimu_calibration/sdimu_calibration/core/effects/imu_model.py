@@ -191,10 +191,10 @@ def build(effects: Sequence[str | Effect], imu: ImuSpecification) -> ImuModel:
         channel += [t.channel for t in effect.terms]
         parameter += [len(parameters) + t.parameter for t in effect.terms]
         parameters += effect.parameters
-        size = prior_size(effect, imu)
-        if size is None or not size > 0:
-            raise DataError(f"{imu.place}: no prior for effect '{effect.name}': add it under prior:")
-        prior += [size] * len(effect.parameters)
+        for size in prior_sizes(effect, imu):
+            if size is None or not size > 0:
+                raise DataError(f"{imu.place}: no prior for effect '{effect.name}': add it under prior:")
+            prior.append(size)
         decay += [1.0 / effect.decay_s if effect.decay_s else 0.0] * len(effect.parameters)
         drive += [effect.random_walk.get(imu.grade, 0.0) ** 2] * len(effect.parameters)
     return ImuModel(
@@ -289,12 +289,33 @@ def prior_sigmas(sensors: ImuModel, frame: str) -> dict[str, float]:
 
 
 def prior_size(effect: Effect, imu: ImuSpecification) -> float | None:
-    """One-sigma (SI) of each parameter of an effect; None where nothing states it.
+    """One-sigma (SI) of an effect, of which nothing is known parameter by parameter; None where nothing states it.
 
-    The IMU file states it of the effect, or of a larger one that contains it; else the grade does.
+    The IMU file states it of the effect, of a larger one that contains it, or of a smaller one that has all of its
+    parameters; else the grade does.
     """
-    stated = (imu.prior[name] for name in (effect.family or effect.name, effect.contained_in) if name in imu.prior)
-    return next(stated, effect.prior.get(imu.grade))
+    return next((imu.prior[name] for name in _stating(effect) if name in imu.prior), effect.prior.get(imu.grade))
+
+
+def prior_sizes(effect: Effect, imu: ImuSpecification) -> list[float | None]:
+    """One-sigma (SI) of each parameter of an effect, as of `prior_size`: a smaller one may have some of them alone."""
+    return [prior_size(one, imu) for one in _each(effect)]
+
+
+def has_stated_priors(effect: Effect, imu: ImuSpecification) -> list[bool]:
+    """Whether the IMU's own file, and not its grade, states the prior of each parameter of an effect."""
+    return [any(name in imu.prior for name in _stating(one)) for one in _each(effect)]
+
+
+def _each(effect: Effect) -> Sequence[Effect]:
+    """Each parameter as an effect of its own; the same effect as often where it has no parts that differ."""
+    return effect.singles if effect.parts else (effect,) * len(effect.parameters)
+
+
+def _stating(effect: Effect) -> tuple[str, ...]:
+    """Names under which an IMU file may state the prior of all parameters of an effect, the first one first."""
+    smaller = {effect.parts.get(p.name, "") for p in effect.parameters}
+    return (effect.family or effect.name, effect.contained_in, *(smaller if len(smaller) == 1 else ()))
 
 
 def _check_priors(chosen: Sequence[Effect], imu: ImuSpecification) -> None:

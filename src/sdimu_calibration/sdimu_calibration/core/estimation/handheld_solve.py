@@ -67,7 +67,7 @@ def _told(roomy: PreparedTest, test: PreparedTest, sensors: ImuModel, wider: Map
     parts = []
     for effect in sensors.effects:
         name, unit = effect.family or effect.name, effect.parameters[0].display_unit
-        before = imu_model.prior_size(effect, test.imu)
+        before = max((size for size in imu_model.prior_sizes(effect, test.imu) if size), default=None)
         if name in wider and before is not None:
             parts.append(f"{name} {from_si(before, unit):.3g} -> {from_si(wider[name], unit):.2g} {unit}")
     note = (

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.core.effects.imu_model import ImuModel, prior_size
+from sdimu_calibration.core.effects.imu_model import ImuModel, prior_sizes
 from sdimu_calibration.core.specification import ImuSpecification
 
 BEYOND = 3.0
@@ -28,11 +28,12 @@ WIDEST = "mems"
 
 def widest_priors(imu: ImuSpecification, sensors: ImuModel) -> ImuSpecification:
     """Give the IMU the priors of the widest grade for the effects of a model; the same object if none is wider."""
-    wider = {
-        effect.family or effect.name: effect.prior[WIDEST]
-        for effect in sensors.effects
-        if (prior_size(effect, imu) or np.inf) < effect.prior.get(WIDEST, 0.0)
-    }
+    wider = {}
+    for effect in sensors.effects:
+        own, widest = [size for size in prior_sizes(effect, imu) if size], effect.prior.get(WIDEST, 0.0)
+        if own and min(own) < widest:
+            # What the file states of some of the parameters may be wider still.
+            wider[effect.family or effect.name] = max(widest, *own)
     return replace(imu, prior={**imu.prior, **wider}) if wider else imu
 
 
@@ -52,11 +53,9 @@ def contradicted(imu: ImuSpecification, sensors: ImuModel, values: Floats, sigma
         By effect the sigma (SI) that gives its coefficients room.
     """
     owner = np.array([e.family or e.name for e in sensors.effects for _ in e.parameters])
+    stated = np.array([size or np.inf for effect in sensors.effects for size in prior_sizes(effect, imu)])
     size = np.abs(values)
-    out = {}
-    stated_sizes = {e.family or e.name: prior_size(e, imu) for e in sensors.effects}
-    for name, stated in stated_sizes.items():
-        mine = (owner == name) & (size > BEYOND * sigma)
-        if stated is not None and mine.any() and size[mine].max() > BEYOND * stated:
-            out[name] = ROOM * float(size[mine].max())
-    return out
+    against = (size > BEYOND * sigma) & (size > BEYOND * stated)
+    return {
+        name: ROOM * float(size[(owner == name) & against].max()) for name in dict.fromkeys(owner[against].tolist())
+    }

@@ -10,7 +10,7 @@ from sdimu_calibration.core.arrays import Bools
 from sdimu_calibration.core.data.static_detection import StaticIntervals
 from sdimu_calibration.core.effects import body_frame
 from sdimu_calibration.core.effects.bias import GYRO_BIAS
-from sdimu_calibration.core.effects.imu_model import ImuModel
+from sdimu_calibration.core.effects.imu_model import ImuModel, has_stated_priors
 from sdimu_calibration.core.handheld.handheld_data import HandheldRun, turns
 from sdimu_calibration.core.handheld.handheld_fit import FitPriors, LinearisationPoint
 from sdimu_calibration.core.recording import DataError
@@ -57,7 +57,7 @@ def fit_priors(sensors: ImuModel, imu: ImuSpecification, site: Site | None, rest
 
 def _stated(sensors: ImuModel, imu: ImuSpecification) -> Bools:
     """Which coefficients have a prior in the IMU's own file."""
-    return np.array([(e.family or e.name) in imu.prior for e in sensors.effects for _ in e.parameters])
+    return np.array([stated for effect in sensors.effects for stated in has_stated_priors(effect, imu)], dtype=bool)
 
 
 def first_linearisation(run: HandheldRun, sensors: ImuModel, gravity: float) -> LinearisationPoint:
