@@ -183,7 +183,7 @@ def test_files_whose_times_begin_again_are_put_apart_and_others_stay(tmp_path):
         files[-1].write_text("\n".join(lines(np.column_stack([COUNTS, np.arange(N) + 10_000 * k]))))
     apart = read_files(files, chart(tmp_path))
     assert np.diff(apart.ns)[[N - 1, 2 * N - 1]].tolist() == [APART_NS, APART_NS]
-    assert len(apart.notes) == 2
+    assert sum("begin again" in note for note in apart.notes) == 2
     assert "position1.txt: its times begin again" in apart.notes[0]
     stamped = read_files(files, chart(tmp_path, time={"column": 7, "unit": "10ms"}))
     assert stamped.notes == ()

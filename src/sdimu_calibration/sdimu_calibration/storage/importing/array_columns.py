@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdimu_calibration.core.arrays import Floats
-from sdimu_calibration.storage.importing.array_table import ArrayTable
+from sdimu_calibration.storage.importing.array_table import ArrayTable, as_words
 from sdimu_calibration.storage.importing.columns import sensors_by_heading
 
 _ALIKE = 0.05
@@ -70,6 +70,22 @@ class ArrayColumns:
     def texts(self, column: int | str) -> NDArray[Any]:
         """Return nothing that could be a date: those are no columns here."""
         return np.full(len(self._columns[int(column) - 1].values), "")
+
+    def rows(self, column: int) -> int:
+        """Count the rows of a column, from 0."""
+        return len(self._columns[column].values)
+
+    def words(self, column: int) -> NDArray[np.str_]:
+        """Write the numbers of a column, from 0, as words, shape (n,)."""
+        return as_words(self._columns[column].values)
+
+    def labels(self) -> dict[str, NDArray[np.str_]]:
+        """Return the variables of words or truths, each shape (n,), by name."""
+        return self._table.labels()
+
+    def others(self, named: Sequence[int | str]) -> list[str]:
+        """List what is in the file beside some columns, with sizes."""
+        return self._table.others(named)
 
     def clock_of(self, column: int) -> str:
         """Name the times of the timetable in which a column, from 0, stands; empty where it stands in none."""

@@ -28,6 +28,8 @@ _PATIENCE_S = 120.0
 """Time (s) that a MAT file may take: a gigabyte takes ten."""
 _MATIO = "matio"
 """Module that reads objects of MATLAB, and its files of version 7.3."""
+_OBJECTS = "Object arrays"
+"""How numpy begins to say that an array holds objects of Python, which run code when they are read."""
 _REFERENCE = re.compile(r"(.+?)(?:\[(\d+)\])?", re.DOTALL)
 
 
@@ -87,11 +89,36 @@ class ArrayTable:
         """Return what tells a column from others."""
         return str(column)
 
+    def texts(self, column: int | str) -> NDArray[np.str_]:
+        """Read one column as words, shape (n,): text as it is written, truths as true and false, numbers as short."""
+        name = str(column)
+        value = np.asarray(self._arrays.get(name, ()))
+        return as_words(value) if is_label(value) else as_words(self.numbers(column))
+
+    def labels(self) -> dict[str, NDArray[np.str_]]:
+        """Return the variables of words or truths, which may say what is a rest, each shape (n,), by name."""
+        return {name: as_words(np.asarray(value)) for name, value in self._arrays.items() if is_label(value)}
+
+    def others(self, named: Sequence[int | str]) -> list[str]:
+        """List what is there beside some columns, with sizes: whole variables, or single columns of them."""
+        whole = {str(column) for column in named}
+        some: dict[str, set[int]] = {}
+        for name in whole - self._arrays.keys():
+            match = _REFERENCE.fullmatch(name)
+            if match and match.group(2):
+                some.setdefault(match.group(1), set()).add(int(match.group(2)))
+        out = []
+        for name, array in self._arrays.items():
+            if name in some and name not in whole:
+                out += [f"{name}[{k}]" for k in range(1, self._array(name).shape[1] + 1) if k not in some[name]]
+            elif name not in whole:
+                out.append(_sized(name, array))
+        return out
+
     def contents(self) -> str:
         """List the variables with their sizes."""
         self._refuse_object("")
-        sizes = {name: " x ".join(map(str, np.shape(array))) for name, array in sorted(self._arrays.items())}
-        return ", ".join(f"{name} ({size})" if size else name for name, size in sizes.items()) or "(none)"
+        return ", ".join(_sized(name, array) for name, array in sorted(self._arrays.items())) or "(none)"
 
     def numbers(self, column: int | str) -> NDArray[Any]:
         """Read one column in the type it has, shape (n,), so that integer stamps and dates stay exact."""
@@ -118,6 +145,11 @@ class ArrayTable:
         array = np.asarray(value)
         if not _is_matrix(array):
             self._refuse_object(str(column))
+            if array.dtype.kind == "O":
+                raise DataError(
+                    f"{self.path}: variable {name} holds objects of Python, which are not read: save it as numbers or "
+                    f"words, {name}.astype(float) or {name}.astype(str)"
+                )
             raise DataError(f"{self.path}: variable {column} is not a list or matrix of numbers")
         array = array[:, None] if array.ndim == 1 else array
         array = array.T if array.shape[0] < array.shape[1] else array
@@ -141,6 +173,30 @@ class ArrayTable:
                 )
 
 
+def _sized(name: str, array: Any) -> str:
+    """Write a variable with its size; a single number has none, and what cannot be read none either."""
+    size = " x ".join(map(str, np.shape(array))) if np.size(array) else ""
+    return f"{name} ({size})" if size else name
+
+
+def is_label(value: Any) -> bool:
+    """Whether a variable is a list of words or of truths, one a sample."""
+    array = np.asarray(value)
+    return array.dtype.kind in "USb" and max(array.shape, default=0) == array.size > 1
+
+
+def as_words(value: NDArray[Any]) -> NDArray[np.str_]:
+    """Write words, truths or numbers as words, shape (n,)."""
+    flat = value.ravel()
+    if flat.dtype.kind == "b":
+        return np.where(flat, "true", "false")
+    if flat.dtype.kind == "S":
+        return np.char.strip(np.char.decode(flat, "utf-8", "replace"))
+    if flat.dtype.kind == "U":
+        return np.char.strip(flat)
+    return np.array([f"{one:g}" for one in flat.tolist()])
+
+
 def _is_matrix(array: NDArray[Any]) -> bool:
     """Whether an array is a list or matrix of numbers or dates."""
     return array.dtype.kind in "iufM" and array.ndim in {1, 2} and array.size > 0
@@ -154,7 +210,7 @@ def read_npz(path: Path) -> ArrayTable:
         if size > _most(path):
             raise DataError(f"{path}: unpacks to {size} bytes, more than {_most(path)}")
         with np.load(path, allow_pickle=False) as content:
-            return ArrayTable(path, {name: _shaped(content[name]) for name in content.files})
+            return ArrayTable(path, {name: _shaped(content, name) for name in content.files})
     except (DataError, PermissionError):
         raise
     except Exception as error:
@@ -167,8 +223,14 @@ def _most(path: Path) -> int:
     return allowed(path) // 4
 
 
-def _shaped(array: Any) -> NDArray[Any]:
-    """Return an array of numbers; bytes of a file that is none of numpy are no variable."""
+def _shaped(content: Any, name: str) -> NDArray[Any]:
+    """Return an array of a file; bytes that are none of numpy, and objects of Python, are no variable."""
+    try:
+        array = content[name]
+    except ValueError as error:
+        if _OBJECTS not in str(error):
+            raise
+        return np.empty(0, np.object_)
     return np.asarray(array) if isinstance(array, np.ndarray) else np.empty(0)
 
 
@@ -228,3 +290,11 @@ class BinaryTable(ArrayTable):
         if not isinstance(column, int) or not 1 <= column <= width:
             raise DataError(f"{self.path}: no column {column} (a binary file has columns 1 to {width})")
         return self._numbers[:, column - 1 : column]
+
+    def texts(self, column: int | str) -> NDArray[np.str_]:
+        """Read one column as words, shape (n,): numbers, written short."""
+        return as_words(self._array(column)[:, 0])
+
+    def others(self, named: Sequence[int | str]) -> list[str]:
+        """List the columns beside some, by number from 1."""
+        return [f"column {k}" for k in range(1, self._numbers.shape[1] + 1) if k not in named]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from datetime import datetime
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -167,12 +169,21 @@ def _each(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
+RESTS = ("rest", "dwell", "static", "still", "true", "1")
+"""What a column says at rest where the map does not name its words."""
+
+
+def is_rest(label: str, words: Sequence[str]) -> bool:
+    """Whether a label is one of some words, ``*`` standing for anything, in large letters or small ones."""
+    return any(fnmatchcase(label.lower(), word.lower()) for word in words)
+
+
 class PhaseMap(Schema):
     """Which rows are at rest."""
 
     column: Column
     """Holds a word or a number."""
-    rest: Annotated[tuple[str, ...], BeforeValidator(_words)] = ("rest", "dwell", "static", "still", "true", "1")
+    rest: Annotated[tuple[str, ...], BeforeValidator(_words)] = RESTS
     """What it says at rest; ``*`` stands for anything (``pos*``). Another word of them begins another rest."""
     file: str | None = None
     """As of a sensor."""

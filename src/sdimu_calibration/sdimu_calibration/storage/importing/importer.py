@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatch, fnmatchcase
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,10 @@ from sdimu_calibration.core.data.resample import mean_over, same_stamps
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
-from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap
+from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap, is_rest
 from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, lone_stamps, read_stamps
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file
+from sdimu_calibration.storage.importing.unused_columns import Unused, in_words, unused
 
 _KELVIN = 273.15
 APART_NS = 60_000_000_000
@@ -38,6 +39,8 @@ class Imported:
     """What was done beyond copying."""
     status: Status | None = None
     """Where a column says what is a rest."""
+    unused: tuple[Unused, ...] = ()
+    """Of each file what the map does not name."""
 
     def later(self, by_ns: int) -> Imported:
         """Return the same samples at later times."""
@@ -59,8 +62,10 @@ def read_files(paths: Sequence[Path], chart: ImportMap) -> Imported:
         chart.phase.file if chart.phase else None,
     )
     if len(paths) > 1 and not any(named):
-        return _in_a_row([_read([path], chart) for path in paths], [Path(path) for path in paths])
-    return _read(paths, chart)
+        found = _in_a_row([_read([path], chart) for path in paths], [Path(path) for path in paths])
+    else:
+        found = _read(paths, chart)
+    return replace(found, notes=(*found.notes, *in_words(found.unused)))
 
 
 def _read(paths: Sequence[Path], chart: ImportMap) -> Imported:
@@ -88,7 +93,7 @@ def _together(tables: list[Table], chart: ImportMap) -> Imported:
         notes.append(note)
     temperature = None if chart.temperature is None else _temperature(tables, chart, chart.temperature)
     status = None if chart.phase is None else _status(tables, chart, chart.phase)
-    return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes), status)
+    return Imported(gyro_ns, omega_ib_b, f_ib_b, temperature, tuple(notes), status, tuple(unused(tables, chart)))
 
 
 def _refuse_twice(tables: list[Table], chart: ImportMap) -> None:
@@ -133,6 +138,7 @@ def _in_a_row(parts: Sequence[Imported], paths: Sequence[Path]) -> Imported:
         (np.concatenate([ns for ns, _ in heat]), np.concatenate([value for _, value in heat])) if heat else None,
         tuple(notes),
         _one_status([part.status for part in moved if part.status is not None]),
+        tuple(one for part in parts for one in part.unused),
     )
 
 
@@ -228,8 +234,8 @@ def _temperature(tables: list[Table], chart: ImportMap, part: TemperatureMap) ->
 
 def _status(tables: list[Table], chart: ImportMap, part: PhaseMap) -> Status:
     table = _chosen(tables, part.file, "phase")
-    rows = len(table.floats([part.column])) if not isinstance(table, TextTable) else len(table.texts(part.column))
-    ns, _ = read_stamps(table, chart.time.column, chart.time, rows)
+    labels = table.texts(part.column)
+    ns, _ = read_stamps(table, chart.time.column, chart.time, len(labels))
     return read_phase(table, part, ns)
 
 
@@ -265,10 +271,10 @@ def read_phase(table: Table, part: PhaseMap, ns: Stamps) -> Status:
     Status
         A rest begins with the interval of its first row: at the stamp of the row before.
     """
-    labels = _labels(table, part.column)
+    labels = table.texts(part.column)
     if len(labels) != len(ns):
         raise DataError(f"{table.path}: column {part.column}: {len(labels)} labels for {len(ns)} samples")
-    words = {label: _is_rest(label, part.rest) for label in np.unique(labels).tolist()}
+    words = {label: is_rest(label, part.rest) for label in np.unique(labels).tolist()}
     if not any(words.values()):
         there = ", ".join(f"'{word}'" for word in list(words)[:_SHOWN])
         raise DataError(
@@ -281,13 +287,3 @@ def read_phase(table: Table, part: PhaseMap, ns: Stamps) -> Status:
     at = np.flatnonzero(change)
     stop = np.maximum(np.cumsum(rest[at]) - 1, 0)
     return ns[np.maximum(at - 1, 0)], rest[at], stop.astype(np.int64)
-
-
-def _is_rest(label: str, wanted: tuple[str, ...]) -> bool:
-    return any(fnmatchcase(label.lower(), word.lower()) for word in wanted)
-
-
-def _labels(table: Table, column: int | str) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
-    if isinstance(table, TextTable):
-        return np.asarray(table.texts(column))
-    return np.array([f"{value:g}" for value in table.floats([column])[:, 0].tolist()])

@@ -18,9 +18,11 @@ from sdimu_calibration.storage.importing.array_table import read_mat, read_npz
 from sdimu_calibration.storage.importing.column_scales import Scale, accel_scale, gyro_scale
 from sdimu_calibration.storage.importing.columns import Pair, changes, pairs_by_heading, sensors_by_heading
 from sdimu_calibration.storage.importing.import_map import ISO
+from sdimu_calibration.storage.importing.other_columns import Other, phase_of, temperature_of
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file, column_text
 from sdimu_calibration.storage.importing.time_column import Table, TimeColumn, time_of
 from sdimu_calibration.storage.importing.unnamed_columns import pairs_by_numbers
+from sdimu_calibration.storage.importing.unused_columns import shown
 
 _UNKNOWN_HZ = 100.0
 """Sample rate (Hz) that stands in a map of a file without times, to be corrected by the user."""
@@ -70,6 +72,7 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
 
 _PAGE = "doc/recordings.md, Import"
 _WRITE = f"write a map ({_PAGE}) and name it by --map"
+_ASK_PHASE = f"; if one of them says what is a rest, name it in the map, phase ({_PAGE})"
 
 
 def _shown(table: Table) -> str:
@@ -141,11 +144,15 @@ def _proposal(table: Table, numbers: Floats, pair: Pair, time: TimeColumn, found
     rate_hz = time.rate_hz or _UNKNOWN_HZ
     own = _clock(table, pair.accel[0])
     rates = gyro_scale(w, f * force.factor, rate_hz, pair.gyro_unit)
+    others = _others(table, numbers, pair, time)
+    left = table.others([*names, time.column, own, *(one.column for one in others.values())])
     words = [
         f"{path}: accelerometers {_listed(names[:3])} and gyros {_listed(names[3:])}, by {by}",
         f"accelerometers: {force.why}",
         f"gyros: {rates.why}",
         f"time: {time.why}" + ("" if time.known else f"; rate_hz: {_UNKNOWN_HZ:g} stands in the map: correct it"),
+        *(f"{what}: {one.why}" for what, one in others.items()),
+        *([f"{path}: not used: {shown(left)}{'' if 'phase' in others else _ASK_PHASE}"] if left else []),
         *doubts,
         *table.notes,
     ]
@@ -160,8 +167,20 @@ def _proposal(table: Table, numbers: Floats, pair: Pair, time: TimeColumn, found
         *_sensor("accel", names[:3], force),
         *([f"  time: {column_text(own)}"] if own not in ("", time.column) else []),
         *_sensor("gyro", names[3:], rates),
+        *(one.line for one in others.values()),
     ]
     return Proposal(suffix, "\n".join(lines) + "\n", tuple(words))
+
+
+def _others(table: Table, numbers: Floats, pair: Pair, time: TimeColumn) -> dict[str, Other]:
+    """Find what a map can take beside the sensors and the times."""
+    clock = [k for k in range(numbers.shape[1]) if table.name_of(k) == time.column]
+    taken = [*pair.accel, *pair.gyro, *clock]
+    found = {
+        "phase": phase_of(table, table.rows(pair.gyro[0]), taken),
+        "temperature": temperature_of(table, numbers, taken),
+    }
+    return {what: one for what, one in found.items() if one is not None}
 
 
 def _doubts(table: Table, numbers: Floats, columns: Sequence[int]) -> list[str]:

@@ -59,14 +59,17 @@ def _read_plain(source: str) -> Content:
 
 
 def _flatten(name: str, value: Any, found: Content) -> None:
-    """Name the fields of structures ``struct.field``; what is not numbers keeps its name and nothing else."""
+    """Name the fields of structures ``struct.field``; what is neither numbers nor words keeps its name alone."""
     fields = getattr(value, "_fieldnames", None)
     if fields is not None:
         for field in fields:
             _flatten(f"{name}.{field}", getattr(value, field, None), found)
         return
     array = np.asarray(value)
-    found.arrays[name] = array if array.dtype.kind in "iuf" else np.empty(0, "U1")
+    if array.dtype.kind == "O" and all(isinstance(one, str) for one in array.flat):
+        # A cell array of words.
+        array = array.astype(str)
+    found.arrays[name] = array if array.dtype.kind in "iufbU" else np.empty(0, "U1")
 
 
 if __name__ == "__main__":

@@ -186,6 +186,19 @@ class TextTable:
         read = self._load([column], [self.place(column)], np.str_)[:, 0]
         return np.char.strip(np.asarray(read, np.str_), " \"'")
 
+    def rows(self, column: int) -> int:
+        """Count the rows of a column, from 0: all have as many."""
+        del column
+        return len(self._rows())
+
+    def words(self, column: int) -> NDArray[np.str_]:
+        """Read a column, from 0, as it is written, shape (n,)."""
+        return self.texts(column + 1)
+
+    def labels(self) -> dict[str, NDArray[np.str_]]:
+        """Return columns of words that have no heading among those of the table: none."""
+        return {}
+
     def _load(self, columns: Sequence[int | str], places: Sequence[int], kind: type[Any]) -> NDArray[Any]:
         """Read columns, shape (n, k)."""
         lines = self._data()
@@ -196,6 +209,16 @@ class TextTable:
         if len(read) != len(lines):
             raise self._first_bad(columns, places, kind is np.float64)
         return read
+
+    def others(self, named: Sequence[int | str]) -> list[str]:
+        """List the columns beside some, by heading, else by number from 1; those that are not there count for none."""
+        taken = {column - 1 if isinstance(column, int) else self._only(column) for column in named}
+        names = [self.name_of(k) for k in range(self._width) if k not in taken]
+        return [name if isinstance(name, str) else f"column {name}" for name in names]
+
+    def _only(self, heading: str) -> int:
+        """Place of the column of a heading, from 0; -1 where it is none, or not the only one."""
+        return self.headings.index(heading) if self.headings.count(heading) == 1 else -1
 
     def line_of(self, row: int) -> str:
         """Say where a row of data is."""
