@@ -49,6 +49,9 @@ LONG = {
         "test_recordings_of_which_none_knows_an_azimuth_are_a_set[1]",
         "test_noise_that_moves_within_the_only_rest_of_a_recording_is_no_warm_up[mems_industrial-210005-turns0-noise0]",
     ),
+    "test/sdimu_calibration/core/posterior/test_detectable.py": (
+        "test_the_search_tells_about_four_in_five_effects_of_the_stated_size",
+    ),
     "test/sdimu_calibration/core/posterior/test_near.py": (
         "test_a_diagnosis_tells_what_it_tells_with_all_of_them",
         "test_what_is_kept_is_what_a_move_brings_near_the_best_model",

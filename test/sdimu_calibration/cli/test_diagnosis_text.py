@@ -27,7 +27,7 @@ from sdimu_calibration.core.diagnosis.summary import DiagnosisSummary, summarise
 from sdimu_calibration.core.evidence.held_out import HeldOut
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.units import to_si
-from sdimu_calibration.report import data, sections
+from sdimu_calibration.report import sections
 from sdimu_calibration.report.cost import coefficients_off, wrong_without
 
 
@@ -107,7 +107,7 @@ def test_terminal_and_page_say_what_they_count_as_unseen_and_at_which_size(summa
     assert (
         f"{len(hidden)} of {len(summary.reached)} candidates (each axis and time of an effect counts) {never}" in told
     )
-    page = sections.smallest(data.scored(summary.diagnosis), summary.assumed, summary.untestable)
+    page = sections.smallest(summary.reached, summary.assumed, summary.untestable)
     families = len({one.family for one in hidden})
     assert "have an axis on which they could not have been seen at their usual size" in page
     assert f", {families} of these one on which they {never}." in page

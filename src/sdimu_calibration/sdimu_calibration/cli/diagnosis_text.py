@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from sdimu_calibration.cli.console import say as line
 from sdimu_calibration.cli.next_commands import print_advice
 from sdimu_calibration.cli.wide_table import print_table
+from sdimu_calibration.core.diagnosis.found import TOLD_AS
 from sdimu_calibration.core.diagnosis.grades import NAMED, percents_of
 from sdimu_calibration.core.diagnosis.ladder import figures_in_words
 from sdimu_calibration.core.diagnosis.verdict import POSSIBLE, beyond, error_falls
@@ -225,7 +226,7 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
             f"{taken_for_granted(summary.assumed)}",
         )
     if any(r.testable for r in summary.reached):
-        line(console, f"smallest sizes that would have been found (80 %): {smallest(summary.reached)}")
+        line(console, f"told in 80 % of tests, {TOLD_AS}, from: {smallest(summary.reached)}")
 
 
 def taken_for_granted(assumed: Sequence[Assumed]) -> str:

@@ -150,9 +150,8 @@ class Scored:
     """`z`, `left`: score with the model as given, and with what was found added."""
     estimate: float
     sigma: float
-    smallest: float
     prior: float
-    """`smallest`, `prior`: minimal detectable size, and the size that physics gives it (inf where unknown)."""
+    """The size that physics gives it (inf where unknown)."""
     retention: float
     """Share of its signature that the model leaves."""
     chosen: bool
@@ -200,7 +199,6 @@ def _scored(evidence: LinearEvidence, index: int, first: Scan, last: Scan, chose
         float(last.z[index]),
         float(first.estimate[index]) * factor,
         float(first.sigma[index]) * factor,
-        float(first.smallest[index]) * factor,
         float(evidence.prior[index - len(evidence.weight)]) * factor,
         float(first.retention[index]),
         chosen,

@@ -180,7 +180,7 @@ def _evidence(summary: DiagnosisSummary, more: ReportExtras, means: bool, spell:
         unknown_section(unknown_of(diagnosis), draw),
         sections.effects(summary, candidates, draw),
         sections.confused(summary, spell),
-        sections.smallest(candidates, summary.assumed, summary.untestable),
+        sections.smallest(summary.reached, summary.assumed, summary.untestable),
         in_use(more, draw),
         sections.residuals(diagnosis, residuals, more, draw),
     ]

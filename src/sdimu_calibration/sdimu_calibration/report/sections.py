@@ -11,7 +11,7 @@ from sdimu_calibration.core.advice import Kind
 from sdimu_calibration.core.diagnosis.advice import Untestable
 from sdimu_calibration.core.diagnosis.assumed import Assumed
 from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
-from sdimu_calibration.core.diagnosis.found import Found
+from sdimu_calibration.core.diagnosis.found import TOLD_AS, DetectableSize, Found
 from sdimu_calibration.core.diagnosis.grades import NAMED, named, percents_of
 from sdimu_calibration.core.diagnosis.ladder import Rung, figures_in_words
 from sdimu_calibration.core.diagnosis.step import Step
@@ -395,19 +395,19 @@ def separation(calibration: Calibration, draw: Draw) -> str:
     return f"<p>{escape(words)}</p>{draw(evidence_figures.correlation(names, C))}"
 
 
-_SMALLEST = ("effect", "smallest that would be found", "unit", "usual size", "share of signature left", "testable here")
+_SMALLEST = ("effect", "size told in 80 %", "unit", "usual size", "share of signature left", "testable here")
 
 
 def smallest(
-    entries: Sequence[data.Scored], assumed: Sequence[Assumed] = (), untestable: Sequence[Untestable] = ()
+    reached: Sequence[DetectableSize], assumed: Sequence[Assumed] = (), untestable: Sequence[Untestable] = ()
 ) -> str:
     """Return the minimal detectable sizes: what this test could have seen, the worst axis of each effect.
 
     `untestable`: why effects could not have been seen.
     """
-    worst: dict[str, data.Scored] = {}
-    for entry in entries:
-        if entry.family != "own" and entry.smallest >= worst.get(entry.family, entry).smallest:
+    worst: dict[str, DetectableSize] = {}
+    for entry in reached:
+        if entry.smallest >= worst.get(entry.family, entry).smallest:
             worst[entry.family] = entry
     order = sorted(worst.values(), key=lambda e: (np.isfinite(e.smallest), -e.smallest / e.prior))
     why = {label: group.reason for group in untestable for label in group.labels}
@@ -420,8 +420,8 @@ def smallest(
         f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         _taken_for_granted(assumed),
         quiet(
-            "Worst axis of each effect. Found with 80 % power at the threshold of a whole scan; usual: one sigma of "
-            "this grade of IMU."
+            f"Worst axis of each effect. Of tests with an effect of this size and nothing else missing, 80 % tell it: "
+            f"{TOLD_AS}. Usual: one sigma of this grade of IMU."
         ),
     )
 
@@ -451,11 +451,11 @@ def _taken_for_granted(assumed: Sequence[Assumed]) -> str:
     return f"<p>{told}</p>{table}"
 
 
-def _seen(entry: data.Scored, why: Mapping[str, str]) -> list[str]:
+def _seen(entry: DetectableSize, why: Mapping[str, str]) -> list[str]:
     """Return a row of `_SMALLEST`. `why`: reasons by label, those that the terminal and diagnosis.json give."""
-    size = three(entry.smallest)
+    size = three(from_si(entry.smallest, entry.display_unit))
     answer = "yes" if entry.smallest <= entry.prior else "only when unusually large"
     if not np.isfinite(entry.smallest) or entry.smallest > WORST_SENSOR * entry.prior:
         size, answer = "", ": ".join(word for word in ("no", why.get(entry.label, "")) if word)
-    usual = three(entry.prior) if np.isfinite(entry.prior) else ""
-    return [entry.label, size, entry.unit, usual, f"{100 * entry.retention:.1f} %", answer]
+    usual = three(from_si(entry.prior, entry.display_unit)) if np.isfinite(entry.prior) else ""
+    return [entry.label, size, entry.display_unit, usual, f"{100 * entry.retention:.1f} %", answer]

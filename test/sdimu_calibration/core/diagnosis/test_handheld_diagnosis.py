@@ -11,7 +11,6 @@ import pytest
 
 from sdimu_calibration.core.diagnosis.diagnose import diagnose
 from sdimu_calibration.core.diagnosis.ground import Request, candidates
-from sdimu_calibration.core.diagnosis.scan import POWER_80
 from sdimu_calibration.core.diagnosis.search import FALSE_ALARM
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.effects import imu_model, registry
@@ -214,7 +213,7 @@ def _draw(clean, rng):
         if r.testable
         and r.retention > 0.1
         and r.family in HIDDEN
-        and (size := rng.uniform(8.0, 30.0) * r.smallest / POWER_80) < 3.0 * prior
+        and (size := rng.uniform(8.0, 30.0) * r.sigma) < 3.0 * prior
     ]
     if not able:
         return None

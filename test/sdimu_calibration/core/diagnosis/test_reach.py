@@ -13,7 +13,7 @@ from sdimu_calibration.core.diagnosis.advice import untestable_by_hand, untestab
 from sdimu_calibration.core.diagnosis.plan_seen import plan_seen
 from sdimu_calibration.core.diagnosis.summary import summarise
 from sdimu_calibration.core.evidence.testable import WORST_SENSOR
-from sdimu_calibration.report import data, sections
+from sdimu_calibration.report import sections
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_what_only_an_impossible_size_would_show_is_not_said_to_be_hidden_by_the
 
 
 def test_the_page_states_no_impossible_size(diagnosis):
-    entry = next(one for one in data.scored(diagnosis) if np.isfinite(one.smallest) and np.isfinite(one.prior))
+    entry = next(one for one in found.reach(diagnosis) if np.isfinite(one.smallest) and np.isfinite(one.prior))
     huge = replace(entry, smallest=1.01 * WORST_SENSOR * entry.prior)
     assert sections._seen(huge, {})[1] == ""
     assert sections._seen(huge, {huge.label: "the plan does not turn"})[-1] == "no: the plan does not turn"
@@ -59,7 +59,7 @@ def test_the_page_says_for_the_same_reason_as_the_terminal_why_an_effect_is_not_
     """A wrong gravity was a common scale factor there, and taken by the coefficients or too small here."""
     summary = summarise(diagnosis)
     reasons = {label: group.reason for group in summary.untestable for label in group.labels}
-    page = sections.smallest(data.scored(diagnosis), (), summary.untestable)
+    page = sections.smallest(summary.reached, (), summary.untestable)
     for label in ("reference_gravity", "reference_deflection_east"):
         row = page[page.index(f">{label}<") :]
         assert escape(f"no: {reasons[label]}") in row[: row.index("</tr>")]

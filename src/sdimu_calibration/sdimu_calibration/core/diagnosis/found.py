@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,16 +13,20 @@ from sdimu_calibration.core.diagnosis.coefficient_shifts import CoefficientShift
 from sdimu_calibration.core.diagnosis.free_input_test import free_input_test
 from sdimu_calibration.core.diagnosis.ladder import error_ladder
 from sdimu_calibration.core.diagnosis.problem import Problem
-from sdimu_calibration.core.diagnosis.scan import POWER_80, scan
+from sdimu_calibration.core.diagnosis.scan import scan
 from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.linear import LinearEvidence
 from sdimu_calibration.core.evidence.testable import WORST_SENSOR
+from sdimu_calibration.core.posterior.board import Board
+from sdimu_calibration.core.posterior.detectable import told_from
 from sdimu_calibration.core.posterior.told import Share
 from sdimu_calibration.core.probability import normal_tail
 
 if TYPE_CHECKING:
     from sdimu_calibration.core.diagnosis.diagnose import Diagnosis
 
+TOLD_AS = "as itself, or among those that look the same"
+"""How an effect of the size in `DetectableSize` is told."""
 DECIDED = 0.95
 """Probability of a family (1) from which a member of it is advised to be kept: one in twenty is wrong then."""
 
@@ -196,13 +200,18 @@ class DetectableSize:
     unit: str
     display_unit: str
     smallest: float
-    """Size found with 80 % power at the threshold of a whole scan (SI); inf when the model takes all of it."""
+    """Size that is told in 80 % of tests, as itself or as one of those that look the same (SI), as of `told_from`; inf
+    when none is."""
     retention: float
     """Share of its signature that the model's coefficients leave."""
     testable: bool
     """A size that a sensor may have would have been found."""
     partners: tuple[str, ...] = ()
     """Coefficients of the model that take the rest; given when it is not testable."""
+    sigma: float = float("inf")
+    """Of its size beside the model (SI); inf when the model takes all of it."""
+    prior: float = float("inf")
+    """One-sigma size that physics gives it (SI); inf where unknown."""
 
 
 def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
@@ -214,10 +223,12 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
     J = scanned.J
     left = np.greater(J, _ROUNDING * np.diag(full.J))
     with np.errstate(divide="ignore", invalid="ignore"):
-        smallest = np.where(left, POWER_80 / np.sqrt(np.abs(J)), np.inf)
+        sigma = np.where(left, 1.0 / np.sqrt(np.abs(J)), np.inf)
+    size = _told_from(d)
     out = []
     for k, candidate in enumerate(evidence.candidates, start=p):
-        testable = bool(np.isfinite(scanned.sigma[k]) and smallest[k] <= WORST_SENSOR * evidence.prior[k - p])
+        smallest = size.get(candidate.label, float("inf"))
+        testable = bool(np.isfinite(scanned.sigma[k]) and smallest <= WORST_SENSOR * evidence.prior[k - p])
         partners = () if testable else _partners(evidence.names, full.J, evidence.weight, k)
         out.append(
             DetectableSize(
@@ -225,13 +236,23 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
                 candidate.family,
                 candidate.parameter.unit,
                 candidate.parameter.display_unit,
-                float(smallest[k]),
+                smallest,
                 float(scanned.retention[k]),
                 testable,
                 partners,
+                float(sigma[k]),
+                float(evidence.prior[k - p]),
             )
         )
     return tuple(out)
+
+
+def _told_from(d: Diagnosis) -> dict[str, float]:
+    """Size from which each candidate is told in most tests (SI), by label; without those that no search looks at."""
+    window = d.found.posterior
+    board: Board[Any] = Board(d.evidence, looked_at(d), frozenset(), None) if window is None else window.board
+    scores = told_from(board, () if window is None else d.found.noise)
+    return {board.evidence.candidate(column).label: size for column, size in scores.size.items()}
 
 
 _ROUNDING = 1e-9

@@ -15,8 +15,6 @@ from sdimu_calibration.core.evidence.information import Information
 from sdimu_calibration.core.evidence.testable import INDISTINGUISHABLE, TESTABLE
 from sdimu_calibration.core.side_by_side import side_by_side
 
-POWER_80 = 4.84
-"""Size of an effect (sigma) that is found with 80 % power: 0.84 above the usual threshold of a whole scan, 4.0."""
 _DRAWS = 4000
 """Number of draws of noise: at a false-alarm probability of 0.02, 80 of them are beyond the threshold, which is then
 right to a tenth of that probability."""
@@ -37,8 +35,6 @@ class Scan:
     """`estimate`, `sigma`: shape (q,). SI; sigma is inf where not testable."""
     retention: Floats
     """Share of the signature that the model leaves, shape (q,)."""
-    smallest: Floats
-    """Minimal detectable size (SI), shape (q,)."""
     J: Floats
     d: Floats
     """`J`, `d`: shape (q,). Information on each parameter (1/sigma^2, SI) and the information vector, given the model:
@@ -63,7 +59,7 @@ def scan(full: Information, known: Ints, weight: Floats) -> Scan:
         sigma = np.where(testable, 1.0 / np.sqrt(J), np.inf)
         estimate = np.where(testable, d / J, 0.0)
     z = np.where(testable, estimate / sigma, 0.0)
-    return Scan(z, estimate, sigma, np.nan_to_num(retention), POWER_80 * sigma, J, d)
+    return Scan(z, estimate, sigma, np.nan_to_num(retention), J, d)
 
 
 def threshold(full: Information, known: Ints, weight: Floats, tested: Ints, alpha: float, seed: int = 1) -> float:
