@@ -177,3 +177,61 @@ def test_objects_of_python_spoil_no_other_array_and_are_told_where_the_map_names
     assert "not used: phase (an import" in note
     with pytest.raises(DataError, match=r"a\.npz: variable phase holds objects of Python.*phase\.astype\(str\)"):
         read(tmp_path / "a.npz", PHASED)
+
+
+def text(path, heading, columns):
+    np.savetxt(path, np.column_stack(columns), fmt="%.9g", delimiter=",", header=heading, comments="")
+    return path
+
+
+BY_NAME = {
+    **MAP,
+    "accel": {"columns": ["ax", "ay", "az"], "unit": "m/s^2"},
+    "gyro": {"columns": ["gx", "gy", "gz"], "unit": "rad/s"},
+}
+SIX = "t,ax,ay,az,gx,gy,gz"
+
+
+def test_times_that_go_back_are_told_with_line_and_way_out_and_single_late_ones_are_not(tmp_path, hand):
+    recording, _ = hand
+    t = recording.t[:600].copy()
+    late, back = t.copy(), t.copy()
+    late[[200, 201]] = late[[201, 200]]
+    back[300:] -= 1.5
+    six = recording.f_ib_b[:600], recording.omega_ib_b[:600]
+    quiet = read(text(tmp_path / "late.csv", SIX, (late, *six)), BY_NAME)
+    assert not quiet.notes
+    (note,) = read(text(tmp_path / "back.csv", SIX, (back, *six)), BY_NAME).notes
+    assert note.startswith(f"{tmp_path / 'back.csv'}: line 302, column t: the times go back by 1.49 s: ")
+    assert "time.rate_hz" in note
+    np.savez(tmp_path / "back.npz", t=back, acc=six[0], gyr=six[1])
+    (note,) = read(tmp_path / "back.npz", MAP).notes
+    assert "back.npz: row 301, column t: the times go back by 1.49 s" in note
+
+
+def test_a_column_that_is_not_there_or_does_not_fit_is_told_with_what_the_map_names_it_for(tmp_path, hand):
+    recording, rest = hand
+    six = text(tmp_path / "a.csv", SIX, (recording.t, recording.f_ib_b, recording.omega_ib_b))
+    np.savez(tmp_path / "a.npz", **{**arrays(hand), "t": recording.t[:50]})
+    for path, changed, told in (
+        (
+            six,
+            {"accel": {"columns": ["fx", "ay", "az"], "unit": "g"}},
+            r"no column 'fx' .*; the map names it for accel x",
+        ),
+        (six, {"phase": {"column": "t"}}, "time and phase both name column 't'"),
+    ):
+        with pytest.raises(DataError, match=told):
+            read(path, {**BY_NAME, **changed})
+    for changed, told in (
+        ({"accel": {"columns": ["f"], "unit": "g"}}, r"no variable 'f' .*; the map names it in accel\.columns"),
+        ({}, rf"column t has 50 times, and there are {len(rest)} samples: name .*time\.column.*rate_hz"),
+    ):
+        with pytest.raises(DataError, match=told):
+            read(tmp_path / "a.npz", {**MAP, **changed})
+
+
+def test_a_file_without_gyros_is_refused_by_saying_so(tmp_path, hand):
+    recording, _ = hand
+    with pytest.raises(DataError, match=r"ax, ay, az are accelerometers, and no columns are called gyros"):
+        propose_maps([text(tmp_path / "a.csv", "t,ax,ay,az", (recording.t, recording.f_ib_b))])

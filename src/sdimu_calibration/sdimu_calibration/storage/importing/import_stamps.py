@@ -28,6 +28,8 @@ _NEAR_EDGE = 0.02
 """Share of a power of two below it that a counter which ends there may not have reached: samples missing at its end."""
 _FAR = 3.0
 """Number of intervals by which a lone stamp lies outside its neighbours: late messages are less out of order."""
+_BACK = 4.0
+"""Number of intervals from which a step back is told: what comes late is less, and a bag takes out smaller steps."""
 _PASSES = 10
 """Number of looks for lone stamps at most: what shows more behind each that is taken out is no accident."""
 _LARGEST_NS = 4e18
@@ -60,7 +62,10 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
     else:
         ns = _from_numbers(table, column, time.unit)
     if len(ns) != samples:
-        raise DataError(f"{table.path}: {len(ns)} times for {samples} samples")
+        raise DataError(
+            f"{table.path}: column {column} has {len(ns)} times, and there are {samples} samples: name the times of "
+            "these samples in the map (time.column, or time of the sensor), or state time.rate_hz"
+        )
     if time.counter is not None:
         ns, notes = counted(table, time.counter, ns, time.rate_hz)
     start_ns = _start_ns(time.start)
@@ -73,6 +78,31 @@ def read_stamps(table: Table, column: int | str | None, time: TimeMap, samples: 
         row = int(np.argmax(ns < 0))
         raise DataError(f"{table.path}: {table.line_of(row)}, column {column}: a time before 1970; check time.start")
     return np.asarray(ns, np.int64), (*notes, *(() if notes else _proposed(ns)))
+
+
+def set_back(table: Table, column: int | str, ns: Stamps) -> tuple[str, ...]:
+    """Say where times go back and stay there: what follows covers times that other samples have.
+
+    Parameters
+    ----------
+    column : int or str
+        Of the times.
+    ns : ndarray of int64, shape (n,)
+        Stamps (ns), those that are lone left out.
+    """
+    step = np.diff(ns)
+    usual = float(np.median(step)) if len(step) else 0.0
+    after = np.flatnonzero(step[:-1] < -_BACK * max(usual, 0.0)) + 1
+    stays = after[ns[after + 1] < ns[after - 1]]
+    if not len(stays) or usual <= 0.0:
+        return ()
+    back = 1e-9 * float(ns[stays[0] - 1] - ns[stays[0]])
+    more = f", and at {len(stays) - 1} more places" if len(stays) > 1 else ""
+    return (
+        f"{table.path}: {table.line_of(int(stays[0]))}, column {column}: the times go back by {back:.3g} s{more}: what "
+        "follows has the times of samples before it, and will pass for another sensor; if the clock was set, state "
+        "time.rate_hz or time.counter in the map, else make a file of each part",
+    )
 
 
 def lone_stamps(ns: Stamps) -> Ints:

@@ -15,7 +15,7 @@ from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.storage.bags.bag_writer import BagContent, write_recording
 from sdimu_calibration.storage.importing.array_table import BinaryTable, read_mat, read_npz
 from sdimu_calibration.storage.importing.import_map import ImportMap, PhaseMap, SensorMap, TemperatureMap, is_rest
-from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, lone_stamps, read_stamps
+from sdimu_calibration.storage.importing.import_stamps import Stamps, Table, lone_stamps, read_stamps, set_back
 from sdimu_calibration.storage.importing.text_table import TextTable, check_file
 from sdimu_calibration.storage.importing.unused_columns import Unused, in_words, unused
 
@@ -103,7 +103,11 @@ def _refuse_twice(tables: list[Table], chart: ImportMap) -> None:
     def take(table: Table, column: int | str | None, name: str) -> None:
         if column is None:
             return
-        first = taken.setdefault((table.path, table.place(column)), name)
+        try:
+            place = table.place(column)
+        except DataError as error:
+            raise DataError(f"{error}; the map names it for {name}") from error
+        first = taken.setdefault((table.path, place), name)
         if first != name:
             raise DataError(f"import map: {first} and {name} both name column '{column}' of {table.path}")
 
@@ -112,6 +116,8 @@ def _refuse_twice(tables: list[Table], chart: ImportMap) -> None:
         for axis, column in zip("xyz", part.columns, strict=False):
             take(table, column, f"{what} {axis}")
         take(table, part.time if part.time is not None else chart.time.column, "time")
+    if chart.phase is not None:
+        take(_chosen(tables, chart.phase.file, "phase"), chart.phase.column, "phase")
     if chart.temperature is not None:
         take(_chosen(tables, chart.temperature.file, "temperature"), chart.temperature.column, "temperature")
 
@@ -200,7 +206,10 @@ def _sensor(
     tables: list[Table], chart: ImportMap, part: SensorMap, what: str
 ) -> tuple[Stamps, Floats, tuple[str, ...]]:
     table = _chosen(tables, part.file, what)
-    raw = table.floats(part.columns)
+    try:
+        raw = table.floats(part.columns)
+    except DataError as error:
+        raise DataError(f"{error}; the map names it in {what}.columns") from error
     if raw.shape[1] != 3:
         raise DataError(f"{table.path}: {what}: {part.columns[0]} has {raw.shape[1]} columns, expected three")
     column = part.time if part.time is not None else chart.time.column
@@ -210,6 +219,8 @@ def _sensor(
     if isinstance(table, TextTable) and len(lone):
         table.leave_out(lone.tolist(), "a time that does not lie between those before and after it")
         raw, ns = np.delete(raw, lone, axis=0), np.delete(ns, lone)
+    if by_column and column is not None:
+        notes = (*notes, *set_back(table, column, ns if isinstance(table, TextTable) else np.delete(ns, lone)))
     values = (raw - np.array(part.bias)) * part.factor
     if part.increments:
         values = values / _interval_s(table, ns)

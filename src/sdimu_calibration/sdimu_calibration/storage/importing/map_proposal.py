@@ -58,9 +58,9 @@ def propose_maps(paths: Sequence[Path]) -> list[Proposal]:
     numbers[~(np.abs(numbers) < _LARGEST)] = np.nan
     pairs, by = _pairs(table, numbers)
     if not pairs:
-        shown = _shown(table) or f"{numbers.shape[1]} columns without headings"
+        there = f"{_shown(table) or f'{numbers.shape[1]} columns without headings'}{_half(table)}"
         raise DataError(
-            f"{path}: it is not clear which columns are the accelerometers and which the gyros ({shown}): {_WRITE}"
+            f"{path}: it is not clear which columns are the accelerometers and which the gyros ({there}): {_WRITE}"
         )
     taken = [k for pair in pairs for k in (*pair.accel, *pair.gyro)]
     suffixes = _suffixes([pair.name for pair in pairs])
@@ -78,6 +78,16 @@ _ASK_PHASE = f"; if one of them says what is a rest, name it in the map, phase (
 def _shown(table: Table) -> str:
     """Name what the user has to choose from."""
     return ", ".join(table.headings[:12]) if isinstance(table, TextTable) else table.contents
+
+
+def _half(table: Table) -> str:
+    """Say which of the two kinds of sensors is there where the other one is not."""
+    accel, gyro = sensors_by_heading(table.headings)
+    if bool(accel) == bool(gyro):
+        return ""
+    here, lacking = ("accelerometers", "gyros") if accel else ("gyros", "accelerometers")
+    names = _listed([table.name_of(k) for k in (accel or gyro)[0].columns])
+    return f"; {names} are {here}, and no columns are called {lacking}"
 
 
 def _table(path: Path) -> Table:
