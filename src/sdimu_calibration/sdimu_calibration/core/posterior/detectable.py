@@ -34,8 +34,10 @@ POWER_SIGMAS = 0.8416
 normal distribution."""
 _LARGEST = 100.0
 """Largest score (sigma) that is looked at: what is not told there is told at no size."""
-_HALVINGS = 18
-"""Number of times that its interval is halved: to a thousandth of a sigma."""
+_USUAL = 8.0
+"""Score (sigma) that is looked at first: most are told from less."""
+_NEAR = 0.01
+"""Width (sigma) to which the interval of a score is halved: no size is stated to a hundredth of its sigma."""
 _TAKES = 0.03
 """Share (1) of the information on an effect below which a noise is no rival of it: it stands beside it as it stands
 beside nothing, and the odds stay the same."""
@@ -180,11 +182,13 @@ def even_scores(
     out = np.empty(len(table))
     for j in range(len(table)):
         alike, noise = near[begin[j] : begin[j + 1]], (offset, taken[j])
-        low, high = 0.0, _LARGEST
+        low, high = 0.0, _USUAL
         if not _log_odds(high, table[j], positive, table, alike, noise, widths) > 0.0:
-            out[j] = np.inf
-            continue
-        for _ in range(_HALVINGS):
+            low, high = high, _LARGEST
+            if not _log_odds(high, table[j], positive, table, alike, noise, widths) > 0.0:
+                out[j] = np.inf
+                continue
+        while high - low > _NEAR:
             middle = 0.5 * (low + high)
             if _log_odds(middle, table[j], positive, table, alike, noise, widths) > 0.0:
                 high = middle
