@@ -268,6 +268,25 @@ def flicker(
 
 
 @app.command()
+def way(
+    out: Annotated[Path, typer.Option(help="Folder of runs and way.json.")] = Path("out/study-way"),
+    runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and noise.")] = 20,
+    seed: Seed = 92_001,
+    imu: Annotated[list[str] | None, typer.Option(help="IMU file; repeatable. All on a table by default.")] = None,
+    noise: Annotated[list[str] | None, typer.Option(help="white, flicker; repeatable. Both by default.")] = None,
+    workers: Workers = 2,
+) -> None:
+    """Feed tests to the filter on the way: do its sigmas hold after some stops."""
+    from sdimu_study.way import NOISES, STUDY
+    from sdimu_study.worlds import HANDHELD
+
+    check_kinds(noise, NOISES)
+    names = imu_files(imu, without=HANDHELD)
+    cases = {(name, one): (name, one) for name in names for one in noise or NOISES}
+    conduct_as_table(STUDY, cases, range(seed, seed + runs), out, workers)
+
+
+@app.command()
 def noise(
     out: Annotated[Path, typer.Option(help="Folder of runs, noise.json, noise.md.")] = Path("out/study-noise"),
     runs: Annotated[int, typer.Option("-n", min=1, help="Tests of each IMU file and kind of noise.")] = 40,
