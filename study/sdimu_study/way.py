@@ -23,8 +23,7 @@ from sdimu_study.worlds import model_of, simulated_recording, true_values
 
 WHITE, FLICKER = "white", "flicker"
 NOISES = (WHITE, FLICKER)
-"""Noise of the simulated sensors beside their white noise, which the IMU file states, too: none, or the bias instability
-that is in the file."""
+"""Noise beside white noise, of the simulated sensors as the IMU file states it: none, or its bias instability."""
 PLAN = "kim18"
 STOPS = (3, 6, 12, 18)
 """Turns after which the estimate at the end of the stop is judged."""

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from sdimu_calibration.core.alignment.prepared import first_attitude, reduce, set_up
 from sdimu_calibration.core.data.axes_and_units import Stated
-from sdimu_calibration.core.effects.body_frame import values_in_frame
+from sdimu_calibration.core.effects.body_frame import frame_jacobian, values_in_frame
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.filter.filter_pass import new_output, run_pass
-from sdimu_calibration.core.filter.pass_setup import pass_input, pass_settings, start_state
+from sdimu_calibration.core.filter.solution import solve
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.live import NS, LiveCalibration
-from sdimu_calibration.core.navigation.track import Correction, motion
+from sdimu_calibration.core.progress import silent
 from sdimu_calibration.core.recording import DataError, seconds
 
 START = 1_700_000_000 * NS
@@ -110,21 +109,22 @@ def test_one_corrupt_sample_costs_neither_the_filter_on_the_way_nor_the_end(name
     np.testing.assert_array_equal(live.finish().values, without.finish().values)
 
 
-def test_stepping_is_one_closed_loop_pass_over_the_whole_test(recording, site, imu, options, model):
+def test_the_filter_on_the_way_ends_where_passes_over_the_whole_test_end(recording, site, imu, options, model):
     _, estimates = feed(recording, options, model, [333] * 20)
     setup = set_up(site, imu, model)
-    prepared, sensors = reduce(recording, setup), setup.sensors
-    start, none = first_attitude(prepared.epochs, prepared.phases, setup), np.zeros(len(sensors.prior))
-    around = setup.around(prepared.temperature)
-    cycles, rest, zero = prepared.cycles, prepared.rest, Correction(sensors, none)
-    seen = motion(cycles, rest, zero, start.C_nb.copy(), around, predicted=False, causal=True)
-    data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
-    output = new_output(len(prepared.epochs), len(none), False, 1)
-    run_pass(data, pass_settings(setup, closed_loop=True), start_state(setup, start, start.C_nb, none), output)
-    assert len(estimates) == len(prepared.epochs)
+    prepared, names = reduce(recording, setup), setup.sensors.names
+    start = first_attitude(prepared.epochs, prepared.phases, setup)
+    whole = solve(setup, prepared, start, None, silent).last
     np.testing.assert_allclose([e.t for e in estimates], prepared.epochs.end, rtol=0, atol=1e-9)
-    expected = values_in_frame(sensors.names, output.estimate, model.body_frame)
-    np.testing.assert_array_equal([e.coefficients for e in estimates], expected)
+    J, sigma = frame_jacobian(names, model.body_frame), np.sqrt(np.diag(estimates[-1].covariance))
+    free = sigma > 0.0
+    expected = np.sqrt(np.diag(J @ whole.covariance @ J.T))[free]
+    # What has come since the last passes is linear about what they knew, and a stop is levelled by what it was so far.
+    np.testing.assert_allclose(sigma[free], expected, rtol=0.02)
+    apart = estimates[-1].coefficients - values_in_frame(names, whole.estimate, model.body_frame)
+    assert (np.abs(apart[free]) < 0.1 * expected).all()
+    far = estimates[5].coefficients - values_in_frame(names, whole.estimate, model.body_frame)
+    assert (np.abs(far[free]) > expected).sum() > 5
 
 
 def test_late_and_unusable_samples_are_counted_and_dropped(recording, options, model):

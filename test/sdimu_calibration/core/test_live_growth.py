@@ -60,8 +60,11 @@ def hours(imu, site):
     return Hours(OpeningOptions(imu, site, stated=SI), model)
 
 
-def test_neither_memory_nor_work_grow_with_the_test(hours):
+def test_neither_memory_nor_work_grow_with_the_test(hours, monkeypatch):
+    # What is kept for passes over everything is let go at its limit, here within the first minutes.
+    monkeypatch.setattr("sdimu_calibration.core.live_history.MOST_CYCLES", 700)
     hours.run(300)
+    assert hours.live._on_the_way._history.closed
     tracemalloc.start()
     hours.run(60)
     before, _ = tracemalloc.get_traced_memory()
@@ -75,6 +78,31 @@ def test_neither_memory_nor_work_grow_with_the_test(hours):
     hours.run(1000)
     # A busy machine makes half of it; a log that is sorted at every epoch made thirty times of it.
     assert median_work(hours) < 2.0 * first
+
+
+def test_what_is_kept_for_passes_is_short_at_rest_and_has_a_limit(hours, monkeypatch):
+    hours.run(600)
+    history = hours.live._on_the_way._history
+    kept, epochs = len(history.prepared().cycles), len(history.prepared().epochs)
+    assert epochs == 600
+    # Of a minute 8 s turn and 10 s after that keep their ten cycles a second; a turning table closes some early.
+    assert kept < 10 * (18 * 10 + 42) + 600
+    assert history._cycles == kept
+    monkeypatch.setattr("sdimu_calibration.core.live_history.MOST_CYCLES", kept + 100)
+    before = hours.live._on_the_way._work
+    hours.run(200)
+    assert history.closed
+    assert history.prepared() is None
+    assert hours.live._on_the_way._work <= before + 3 * 800
+
+
+def test_passes_take_work_in_proportion_to_the_test(hours):
+    for minutes in (5, 10, 15):
+        hours.run(60 * minutes - hours.second)
+        way = hours.live._on_the_way
+        # Four passes at most go beyond what is left of it.
+        assert way._work <= 3 * way._epochs + 1500 + 4 * way._epochs
+    assert way._work > way._epochs
 
 
 def median_work(hours, seconds=120):
@@ -95,8 +123,8 @@ def test_temperatures_that_are_forgotten_are_missed_by_nobody(hours):
         one.run(400)
     assert len(hours.live._intake.temperature_log().t) < 70 * RATE < len(whole.live._intake.temperature_log().t)
     assert len(hours.live._intake.phase_log().t) < 100
-    np.testing.assert_array_equal(hours.live._state.P, whole.live._state.P)
-    np.testing.assert_array_equal(hours.live._state.used, whole.live._state.used)
+    np.testing.assert_array_equal(hours.live._on_the_way.state.P, whole.live._on_the_way.state.P)
+    np.testing.assert_array_equal(hours.live._on_the_way.state.used, whole.live._on_the_way.state.used)
 
 
 @pytest.mark.parametrize("started", [False, True])

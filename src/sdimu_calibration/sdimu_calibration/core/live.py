@@ -12,28 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sdimu_calibration.core.alignment.alignment import Alignment
-from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude, measurement_kinds
+from sdimu_calibration.core.alignment.prepared import ALIGN_S, first_attitude
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.arrival import KeptTest, RawTest, in_order, of_the_test
 from sdimu_calibration.core.data.dwell_detection import GrowingDwells, specification_is_wide
 from sdimu_calibration.core.data.early_reading import EarlyReading
 from sdimu_calibration.core.data.epochs import Epochs, cut
-from sdimu_calibration.core.data.gaps import bridges, largest_acceleration
 from sdimu_calibration.core.data.intake import Intake
 from sdimu_calibration.core.data.phases import Phases, PhaseState, classify
 from sdimu_calibration.core.data.stray_stamps import StampSieve, stray_note
 from sdimu_calibration.core.data.streams import one_stream
 from sdimu_calibration.core.data.why_handheld import why_handheld
 from sdimu_calibration.core.effects import body_frame
-from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.estimation.outcome import calibrate
-from sdimu_calibration.core.filter.filter_pass import PassInput, PassState, new_output, run_pass
-from sdimu_calibration.core.filter.pass_setup import no_shifts, pass_settings, start_state
 from sdimu_calibration.core.front_door import OpenedTest, OpeningOptions, open_test
+from sdimu_calibration.core.live_filter import LiveFilter
 from sdimu_calibration.core.live_model import live_model
 from sdimu_calibration.core.navigation.strapdown import Cycles, Reducer
-from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S, Correction, motion
+from sdimu_calibration.core.navigation.track import TEMPERATURE_WINDOW_S
 from sdimu_calibration.core.recording import NOMINAL_FROM, DataError, PhaseLog, seconds
 from sdimu_calibration.core.results import Calibration
 from sdimu_calibration.core.rotation import quaternion
@@ -46,6 +42,8 @@ NS = 1_000_000_000
 NIS_CHANNELS = ("position", "velocity", "rate", "force")
 _LOOK_S = 60.0
 """Time (s) after which a second publisher is looked for: a minute of samples shows it, and little of a test is lost."""
+_FORGET_S = 5.0
+"""Time (s) after which what the filter has used is forgotten again: looking costs more than keeping it so long."""
 _FAR = 5.0
 """Deviation of chi-square (its standard deviations) that is reported: beyond it a channel contradicts its sigma."""
 
@@ -82,8 +80,8 @@ class EpochEstimate:
     stop_nis: dict[str, float]
     """The same at the present stop, or the last one: what the verdict is about."""
     verdict: str
-    """``consistent``, or which channels contradict their sigma at the present stop. A first pass is linearised about
-    what it did not know yet, so the first stops may complain about a wrong initial azimuth."""
+    """``consistent``, or which channels contradict their sigma at the present stop. Until the filter looks back it is
+    linearised about what it did not know yet, so the first stops may complain about a wrong initial azimuth."""
     counts: dict[str, int]
     """samples, late, lost, rejected, contradicted."""
 
@@ -114,23 +112,22 @@ class LiveCalibration:
         self._dwells: GrowingDwells | None = None
         self._second = 0  # whole seconds after the origin that are done
         self._idle = False
+        self._forgotten = 0.0  # until when what was used has been forgotten (s)
         self._early: KeptTest | None = KeptTest()
-        self._acceleration = 0.0
         self._lost = self._contradicted = 0
         self._reducer: Reducer | None = None
         self._pending: list[Cycles] = []
         self._waiting: list[tuple[Cycles, Epochs, Phases]] = []
         self._phase_state = PhaseState()
-        self._alignment: Alignment | None = None
-        self._state: PassState | None = None
-        self._track = np.eye(3)
-        self._before: Motion | None = None
-        self._settings = pass_settings(self.setup, closed_loop=True)
-        self._J = body_frame.frame_jacobian(self._model.asked.names, model.body_frame)
+        self._on_the_way: LiveFilter | None = None
+        asked = self._model.asked.parameters
+        self._names, self._units, self._display_units = (
+            tuple(getattr(one, word) for one in asked) for word in ("name", "unit", "display_unit")
+        )
+        self._J = body_frame.frame_jacobian(self._names, model.body_frame)
         self._nis_sum = np.zeros(4)
         self._nis_count = np.zeros(4)
         self._stop_nis = np.zeros((2, 4))  # sum and degrees of freedom at the present stop
-        self._rested_s = 0.0  # length of all rests so far
 
     def kept_by(self, raw: Callable[[], RawTest]) -> None:
         """Keep nothing here: the caller keeps everything that comes, on a disk, and gives it back by `raw`."""
@@ -312,16 +309,18 @@ class LiveCalibration:
 
     def _filter(self) -> list[EpochEstimate]:
         """Run the filter over the epochs that wait, once the first dwell has given an attitude."""
-        if self._state is None and not self._align():
+        if self._on_the_way is None and not self._align():
             return []
         estimates = [
             self._one_epoch(cycles, epochs, phases, k)
             for cycles, epochs, phases in self._waiting
             for k in range(len(epochs))
         ]
-        if self._waiting:
+        begun = float(self._waiting[-1][1].start[-1]) if self._waiting else 0.0
+        if begun >= self._forgotten + _FORGET_S:
             # The last one asks for no more than this of what lies before it.
-            self._intake.forget(float(self._waiting[-1][1].start[-1]) - TEMPERATURE_WINDOW_S)
+            self._intake.forget(begun - TEMPERATURE_WINDOW_S)
+            self._forgotten = begun
         self._waiting = []
         return estimates
 
@@ -335,72 +334,15 @@ class LiveCalibration:
         )
         if len(epochs) < ALIGN_S and len(np.unique(phases.dwell)) == 1:
             return False
-        self._alignment = self._model.begun(first_attitude(epochs, phases, self.setup))
-        self._track = self._alignment.C_nb.copy()
-        none = np.zeros(len(self.setup.sensors.prior))
-        self._state = start_state(self.setup, self._alignment, self._alignment.C_nb, none)
+        alignment = self._model.begun(first_attitude(epochs, phases, self.setup))
+        self._on_the_way = LiveFilter(self._model, self._intake.interval_s, alignment)
         return True
 
     def _one_epoch(self, cycles: Cycles, epochs: Epochs, phases: Phases, k: int) -> EpochEstimate:
-        assert self._state is not None
-        setup, sensors = self.setup, self.setup.sensors
-        part = cycles[slice(int(epochs.first[k]), int(epochs.last[k]))]
-        rest = np.full(len(part), phases.dwell[k])
-        if self._model.azimuth_free:
-            # The Earth's rate is seen along the attitude: that of the samples as they come is off by the gyro biases.
-            self._track[:, :] = self._state.C_nb
-        seen = motion(
-            part,
-            rest,
-            Correction(sensors, np.zeros(len(sensors.prior))),
-            self._track,
-            setup.around(self._intake.temperature_log()),
-            predicted=False,
-            before=self._before,
-            causal=True,
-        )
-        self._before = seen
-        one = Phases(*(getattr(phases, n)[k : k + 1] for n in Phases.__dataclass_fields__))
-        kind = measurement_kinds(one, setup.model.zero_velocity == "every_epoch")
-        # The largest acceleration so far; a first gap in the first turn knows no more than that turn's beginning.
-        self._acceleration = max(self._acceleration, largest_acceleration(part))
-        alone = Epochs(
-            np.zeros(1, dtype=np.int64),
-            np.full(1, len(part), dtype=np.int64),
-            *(getattr(epochs, n)[k : k + 1] for n in ("start", "end", "peak_rate", "f_mean", "w_mean")),
-        )
-        gap = bridges(part, alone, one.dwell, self._intake.interval_s, self._acceleration, setup.gravity)
-        data = PassInput(
-            part.dt,
-            part.alpha,
-            part.upsilon,
-            part.coning,
-            part.sculling,
-            alone.first,
-            alone.last,
-            gap.white,
-            gap.angle,
-            gap.velocity,
-            kind,
-            np.zeros(1, dtype=bool),
-            sensors.regressors(seen),
-            sensors.channel,
-            sensors.parameter,
-            *no_shifts(1),
-        )
-        out = new_output(1, len(sensors.prior), False, 1)
-        run_pass(data, self._settings, self._state, out)
-        if phases.dwell[k]:
-            self._rest(float(epochs.end[k] - epochs.start[k]))
-        self._count(out.nis[0], bool(phases.first[k]))
+        assert self._on_the_way is not None
+        self._on_the_way.take(cycles, epochs, phases, k, self._intake.temperature_log())
+        self._count(self._on_the_way.nis, bool(phases.first[k]))
         return self._report(epochs, phases, k)
-
-    def _rest(self, seconds: float) -> None:
-        """Take the noise of an epoch at rest into its mean over all rests so far."""
-        assert self._state is not None
-        self._rested_s += seconds
-        if self._model.noise is not None:
-            self._model.noise.rested(self._state, seconds / self._rested_s)
 
     def _count(self, nis: Floats, first: bool) -> None:
         """Add the squared innovations of an epoch (4,) to those so far; the `first` of a stop begins its own."""
@@ -412,10 +354,10 @@ class LiveCalibration:
         self._stop_nis[:, measured] += np.array([nis[measured], np.full(int(measured.sum()), 3.0)])
 
     def _report(self, epochs: Epochs, phases: Phases, k: int) -> EpochEstimate:
-        assert self._state is not None
         origin_ns = self._intake.origin_ns
         assert origin_ns is not None
-        sensors, frame, state = self._model.asked, self.setup.model.body_frame, self._state
+        assert self._on_the_way is not None
+        frame, state = self.setup.model.body_frame, self._on_the_way.state
         values, covariance = self._model.coefficients(state)
         site = self.setup.site
         radius = 6.371e6 + site.height_m
@@ -426,10 +368,10 @@ class LiveCalibration:
             used=bool(phases.used[k]),
             stop=int(phases.stop[k]),
             body_frame=frame,
-            names=sensors.names,
-            units=tuple(q.unit for q in sensors.parameters),
-            display_units=tuple(q.display_unit for q in sensors.parameters),
-            coefficients=body_frame.values_in_frame(sensors.names, values, frame),
+            names=self._names,
+            units=self._units,
+            display_units=self._display_units,
+            coefficients=body_frame.values_in_frame(self._names, values, frame),
             covariance=self._J @ covariance @ self._J.T,
             position_error_m=np.array(
                 [

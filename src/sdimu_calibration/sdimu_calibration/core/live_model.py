@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from sdimu_calibration.core.alignment.alignment import UNKNOWN_AZIMUTH, Alignment
 from sdimu_calibration.core.alignment.prepared import TestSetup, set_up
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.accelerometer_frame import squares_count
 from sdimu_calibration.core.effects.earth_rate import EAST, with_any_direction
 from sdimu_calibration.core.effects.imu_model import ImuModel, with_references
@@ -18,6 +20,7 @@ from sdimu_calibration.core.effects.references import stated_references
 from sdimu_calibration.core.estimation.free_azimuth import stated_noise_hides_azimuth
 from sdimu_calibration.core.filter.filter_pass import NAV, PassState
 from sdimu_calibration.core.filter.noise_states import NoiseStates, with_noise_states
+from sdimu_calibration.core.filter.pass_setup import NO_MEANS
 from sdimu_calibration.core.front_door import OpeningOptions
 from sdimu_calibration.core.specification import EPOCH_S, Model
 from sdimu_calibration.core.stated_noise import stated_noise
@@ -28,10 +31,10 @@ NO_AZIMUTH = (
 )
 """Note on a filter on the way that does without the azimuth."""
 SQUARES = (
-    "squares of the errors of this IMU count and the filter on the way leaves them out: until the end of the test its "
-    "sigmas are too small; the end takes them into account"
+    "squares of the errors of this IMU count: in the first ten stops sigmas of the filter on the way may be too small; "
+    "it looks back on them with what it knows by then, and the end of the test sees everything"
 )
-"""Note on a filter on the way that is of first order where second order is needed."""
+"""Note on a filter on the way that knows large errors to first order until its passes have seen some stops."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,20 @@ class LiveModel:
     """Where noise with a memory stands among them."""
     azimuth_free: bool
     """The horizontal Earth rate is estimated in the place of the azimuth."""
+
+    @property
+    def averaged(self) -> Ints:
+        """States of noise and their means, as `PassSettings.averaged` has them, shape (w, 2)."""
+        return NO_MEANS if self.noise is None else self.noise.averaged
+
+    @property
+    def constant(self) -> Floats:
+        """1 of what is a constant of the test, 0 of what fades or wanders, and of its mean, shape (q,)."""
+        sensors = self.setup.sensors
+        constant = (sensors.decay_rate == 0.0) & (sensors.drive == 0.0)
+        if self.noise is not None:
+            constant[self.noise.mean] = False
+        return np.asarray(constant.astype(np.float64))
 
     @property
     def notes(self) -> list[str]:

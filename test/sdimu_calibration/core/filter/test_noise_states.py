@@ -9,6 +9,7 @@ from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.imu_model import build
 from sdimu_calibration.core.filter.filter_pass import NAV, PassSettings, PassState, _fade
 from sdimu_calibration.core.filter.noise_states import with_noise_states
+from sdimu_calibration.core.filter.running_mean import into_means, share_of_rests
 from sdimu_calibration.core.noise_term import FLICKER, MARKOV, RANDOM_WALK, NoiseTerm
 from sdimu_calibration.core.specification import EPOCH_S
 
@@ -78,7 +79,7 @@ def test_the_mean_over_rests_is_that_of_the_noise_and_its_covariance_follows(sen
     step[np.ix_(NAV + states.mean, NAV + states.wander)] = 0.25 * states.adds
     expected, P = step @ state.x, step @ state.P @ step.T
     used = step[NAV : NAV + q, NAV : NAV + q] @ state.used
-    states.rested(state, 0.25)
+    into_means(0.25, states.averaged, NAV, state.x, state.P, state.used)
     np.testing.assert_allclose(state.x, expected, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(state.used, used, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(state.P, P, rtol=1e-10, atol=1e-10)
@@ -87,3 +88,13 @@ def test_the_mean_over_rests_is_that_of_the_noise_and_its_covariance_follows(sen
     np.testing.assert_allclose(reported[:6], state.used[:6] + state.used[states.mean], rtol=1e-12)
     assert states.moved.shape == (p, q)
     assert wider.names[:6] == bias.NAMES
+
+
+def test_shares_of_the_rests_so_far_make_the_mean_over_all_of_them():
+    start = np.array([0.0, 1.0, 2.0, 5.0, 6.0])
+    end = np.array([1.0, 2.0, 5.0, 6.0, 8.5])
+    dwell = np.array([True, True, False, True, True])
+    values, mean = np.array([4.0, -1.0, 70.0, 2.5, 3.0]), 0.0
+    for share, value in zip(share_of_rests(start, end, dwell), values, strict=True):
+        mean = (1.0 - share) * mean + share * value
+    assert mean == pytest.approx(np.average(values[dwell], weights=(end - start)[dwell]))

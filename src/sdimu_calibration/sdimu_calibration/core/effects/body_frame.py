@@ -20,11 +20,12 @@ Everywhere `names` are those of the p coefficients of a model, and `frame` is on
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
-from sdimu_calibration.core.arrays import Floats
+from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.recording import DataError
 from sdimu_calibration.core.rotation import skew
 
@@ -50,6 +51,7 @@ _STEP = 1e-5
 """Step of central differences (SI of any coefficient): error 1e-10 by curvature, 1e-11 by rounding."""
 
 
+@cache
 def _places(triad: str, power: str = "") -> dict[str, tuple[int, int, float]]:
     """Coefficient name -> place and sign in the error matrix of a triad (``gyro`` or ``accel``), or a power of it."""
     places = {f"{triad}_scale{power}_{a}": (i, i, 1.0) for i, a in enumerate("xyz")}
@@ -57,6 +59,7 @@ def _places(triad: str, power: str = "") -> dict[str, tuple[int, int, float]]:
     return places
 
 
+@cache
 def _unbalance_places(power: str = "") -> dict[str, tuple[int, int, float]]:
     """Coefficient name -> place in the matrix of the mass unbalance, or a power of it."""
     return {f"gyro_mass_unbalance{power}_{k}": (row, column, 1.0) for k, (row, column) in _UNBALANCE.items()}
@@ -69,18 +72,33 @@ TRIAD_NAMES = tuple(name for triad in _TRIADS for name in triad())
 
 def _matrix(places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> Floats:
     """Error matrices (..., 3, 3) of coefficients (..., p): those without a name here are zero."""
-    E = np.zeros((*values.shape[:-1], 3, 3))
-    for name, (row, column, sign) in places.items():
-        if name in names:
-            E[..., row, column] = sign * values[..., names.index(name)]
+    E, at = np.zeros((*values.shape[:-1], 3, 3)), _found(tuple(places.items()), tuple(names))
+    E[..., at.row, at.column] = at.sign * values[..., at.place]
     return E
+
+
+class _Found(NamedTuple):
+    """Coefficients that a model has: their places in it, and place and sign in an error matrix."""
+
+    place: Ints
+    row: Ints
+    column: Ints
+    sign: Floats
+
+
+@cache
+def _found(places: tuple[tuple[str, tuple[int, int, float]], ...], names: tuple[str, ...]) -> _Found:
+    """Look the names of places up in those of a model, once: a test that runs asks every second."""
+    index = {name: place for place, name in enumerate(names)}
+    rows = [(index[name], *at) for name, at in places if name in index]
+    place, row, column, sign = np.array(rows).reshape(-1, 4).T
+    return _Found(place.astype(np.int64), row.astype(np.int64), column.astype(np.int64), sign)
 
 
 def _read_back(E: Floats, places: dict[str, tuple[int, int, float]], names: Sequence[str], values: Floats) -> None:
     """Put the elements of error matrices (..., 3, 3) into the coefficients (..., p) that have a name here, in place."""
-    for name, (row, column, sign) in places.items():
-        if name in names:
-            values[..., names.index(name)] = sign * E[..., row, column]
+    at = _found(tuple(places.items()), tuple(names))
+    values[..., at.place] = at.sign * E[..., at.row, at.column]
 
 
 def _turned_to_triad(M: Floats) -> Floats:
@@ -384,10 +402,16 @@ def _turning_powers(names: Sequence[str]) -> tuple[str, ...]:
 
     Where the model holds the gyros' axes still, those of the accelerometers turn against them: nothing is free then.
     """
+    return _free_powers(tuple(names))
+
+
+@cache
+def _free_powers(names: tuple[str, ...]) -> tuple[str, ...]:
+    known = set(names)
     return tuple(
         power
         for power in _BY_TEMPERATURE
-        if {*_pinned(power), *(f"gyro_misalignment{power}_{pair}" for pair in _MISALIGNMENT)} <= set(names)
+        if {*_pinned(power), *(f"gyro_misalignment{power}_{pair}" for pair in _MISALIGNMENT)} <= known
     )
 
 

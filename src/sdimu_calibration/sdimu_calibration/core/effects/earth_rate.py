@@ -42,6 +42,8 @@ def horizontal_earth_rate(latitude: float) -> Effect:
         group=REFERENCES,
         scope="recording",
         needs_table=True,
+        # It changes with the attitude alone: the slope along rate and force is zero everywhere.
+        linear=True,
     )
 
 

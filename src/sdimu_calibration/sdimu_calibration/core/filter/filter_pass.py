@@ -35,6 +35,8 @@ from sdimu_calibration.core import earth
 from sdimu_calibration.core.arrays import Bools, Floats, Ints
 from sdimu_calibration.core.compiled import compiled
 from sdimu_calibration.core.filter.kalman import predict, propagate, update, whiten
+from sdimu_calibration.core.filter.running_mean import into_means
+from sdimu_calibration.core.filter.shaken import at_the_end
 from sdimu_calibration.core.matrix3 import applied, corner, elements, put, sparse_product, transposed
 from sdimu_calibration.core.measurement_kind import ALL, SKIP
 from sdimu_calibration.core.navigation.ins_errors import (
@@ -86,6 +88,8 @@ class PassInput(NamedTuple):
     """Stop to whose attitude navigation goes before the epoch, -1 where it goes on as it is, shape (e,)."""
     C_stop: Floats
     """Attitude about which each of k stops is linearised, b to n (dimensionless), shape (k, 3, 3)."""
+    share: Floats
+    """Length of an epoch at rest over that of all rests so far, 0 of others (1), shape (e,)."""
 
 
 class PassSettings(NamedTuple):
@@ -114,6 +118,8 @@ class PassSettings(NamedTuple):
     """Model the cross-covariance M."""
     shaken: bool = False
     """The table vibrates at rest: the force of an epoch is that of its mean attitude, not of the one at its end."""
+    averaged: Ints = np.empty((0, 2), dtype=np.int64)
+    """Places of states of noise and of their means over the rests so far, as of `into_means`, shape (w, 2)."""
 
 
 class PassState(NamedTuple):
@@ -387,34 +393,6 @@ def _write(out: PassOutput, e: int, low: int, innovation: Floats, white: Floats,
 
 
 @compiled
-def at_the_end(latitude: float, f_n: Floats, dts: Floats, C_mean: Floats, C_nb: Floats, sums: Floats) -> None:
-    """Bring the velocity increment of an epoch from its mean attitude to the one at its end, in place.
-
-    The mean attitude of a cycle is that against the axes at its begin: half of its Earth rate is in it.
-
-    Parameters
-    ----------
-    latitude : float
-        Of the site (rad).
-    f_n : ndarray, shape (3,)
-        Specific force at rest in NED (m/s^2).
-    dts : ndarray, shape (n,)
-        Lengths of the cycles (s).
-    C_mean : ndarray, shape (n or more, 3, 3)
-        Mean attitude of each cycle, b to n (dimensionless).
-    C_nb : ndarray, shape (3, 3)
-        Attitude at the end of the epoch, b to n (dimensionless).
-    sums : ndarray, shape (6,)
-        Angle (rad) and velocity increment (m/s) in b; the latter changes.
-    """
-    north = earth.earth_rate(latitude)[0]
-    for k in range(dts.shape[0]):
-        for i in range(3):
-            mean = C_mean[k, 2, i] - 0.5 * dts[k] * north * C_mean[k, 1, i]
-            sums[3 + i] -= dts[k] * f_n[2] * (mean - C_nb[2, i])
-
-
-@compiled
 def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: PassOutput) -> None:
     """Navigate, propagate and measure, epoch by epoch; `state` and `out` are filled in place."""
     p = state.used.shape[0]
@@ -470,6 +448,8 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 put(L, out.L[e], low, low)
             if kind > 0:
                 _feed_back(settings, state, p)
+        if data.share[e] > 0.0:
+            into_means(data.share[e], settings.averaged, NAV, state.x, state.P, state.used)
         for j in range(p):
             out.estimate[e, j] = state.used[j] + state.x[NAV + j]
         for i in range(state.x.shape[0]):

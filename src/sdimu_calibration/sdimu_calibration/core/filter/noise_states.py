@@ -20,7 +20,6 @@ from sdimu_calibration.core.effects import bias
 from sdimu_calibration.core.effects.effect import ACCEL, GYRO, REFERENCES, Effect, Parameter, Term
 from sdimu_calibration.core.effects.imu_model import ImuModel, with_serving
 from sdimu_calibration.core.effects.motion import Motion
-from sdimu_calibration.core.filter.filter_pass import NAV, PassState
 from sdimu_calibration.core.noise_term import FLICKER, RANDOM_WALK, TRIADS, NoiseTerm
 from sdimu_calibration.core.specification import EPOCH_S
 
@@ -61,23 +60,11 @@ class NoiseStates:
     """Shape (p, p + w + c). What is reported of p coefficients by all that are estimated: biases with the mean of their
     noise (1)."""
 
-    def rested(self, state: PassState, share: float) -> None:
-        """Take the noise at the end of an epoch at rest into the means, in place.
-
-        Parameters
-        ----------
-        share : float
-            Length of the epoch over that of all rests so far, itself among them (1).
-        """
-        for vector, first in ((state.used, 0), (state.x, NAV)):
-            vector[first + self.mean] = self._averaged(vector, first, share)
-        P = state.P
-        P[NAV + self.mean] = self._averaged(P, NAV, share)
-        P[:, NAV + self.mean] = self._averaged(P.T, NAV, share).T
-
-    def _averaged(self, rows: Floats, first: int, share: float) -> Floats:
-        noise = self.adds @ rows[first + self.wander]
-        return np.asarray((1.0 - share) * rows[first + self.mean] + share * noise)
+    @property
+    def averaged(self) -> Ints:
+        """Places as `PassSettings.averaged` has them, shape (w, 2)."""
+        of, which = np.nonzero(self.adds)
+        return np.ascontiguousarray(np.column_stack([self.wander[which], self.mean[of]]))
 
 
 def with_noise_states(sensors: ImuModel, terms: Sequence[NoiseTerm]) -> tuple[ImuModel, NoiseStates | None]:

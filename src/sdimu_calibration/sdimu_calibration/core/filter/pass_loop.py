@@ -17,7 +17,7 @@ MOST_PASSES = 30
 """Number of passes at most: where the estimate still moves then, it does not converge."""
 CONVERGED = 0.02
 """Largest movement of a coefficient (sigma) at which the passes end: smaller ones change no report."""
-_SETTLED = 5.0
+SETTLED = 5.0
 """Movement of a coefficient (sigma) below which Zv and Zp are taken in: the azimuth has found its place. A pass leaves
 the square of what was wrong (of movements of 1 to 5 sigma the next one was below 0.004, in eight tests of two IMUs)."""
 
@@ -84,7 +84,7 @@ def until_nothing_moves(
         at = StartPoint(last.smoothed_start, last.estimate)
         if not loose and moved < CONVERGED:
             return last, count, True
-        loose = loose and moved >= _SETTLED
+        loose = loose and moved >= SETTLED
     return last, MOST_PASSES, False
 
 

@@ -12,6 +12,7 @@ from sdimu_calibration.core.alignment.prepared import PreparedData, TestSetup
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.data.phases import restarts
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassSettings, PassState
+from sdimu_calibration.core.filter.running_mean import share_of_rests
 from sdimu_calibration.core.measurement_kind import SKIP
 from sdimu_calibration.core.recording import DivergedError
 from sdimu_calibration.core.rotation import rotation_vector
@@ -28,8 +29,18 @@ _MOTION_S = 60.0
 """Length of a usual turn (s): at 2 deg/s one of 90 deg takes 45 s, one of 180 deg 90 s."""
 
 
-def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
-    """Constants of a pass."""
+NO_MEANS: Ints = np.empty((0, 2), dtype=np.int64)
+"""Places of states that are means of others, shape (0, 2), dimensionless: none has noise with a memory."""
+
+
+def pass_settings(setup: TestSetup, closed_loop: bool, averaged: Ints = NO_MEANS) -> PassSettings:
+    """Make the constants of a pass.
+
+    Parameters
+    ----------
+    averaged : ndarray of int, shape (w, 2)
+        Places of states of noise and of their means, as in `PassSettings` (dimensionless).
+    """
     site, imu, model = setup.site, setup.imu, setup.model
     return PassSettings(
         reference=np.array([site.latitude_rad, 0.0, site.height_m]),
@@ -45,6 +56,7 @@ def pass_settings(setup: TestSetup, closed_loop: bool) -> PassSettings:
         closed_loop=closed_loop,
         shared_noise=model.shared_noise,
         shaken=setup.shaken,
+        averaged=averaged,
     )
 
 
@@ -127,6 +139,7 @@ def pass_input(prepared: PreparedData, values: Floats, channel: Ints, parameter:
         channel,
         parameter,
         *no_shifts(len(e)),
+        share_of_rests(e.start, e.end, prepared.phases.dwell),
     )
 
 

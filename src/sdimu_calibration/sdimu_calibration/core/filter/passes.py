@@ -33,7 +33,7 @@ from sdimu_calibration.core.recording import DataError, DivergedError
 
 SNAPSHOT_EPOCHS = 5
 """Number of epochs from one kept covariance of the coefficients to the next: it changes slowly, and is large."""
-_PIECE = 3
+PIECE = 3
 """Number of epochs (1 s, up to 10 s in long rests) of a stop between two shifts of the attitude to that of the stop: in
 more, a cheap gyro drifts so far that azimuth looks observable."""
 
@@ -175,5 +175,5 @@ def _shifts(prepared: PreparedData, where: Layout) -> Ints:
     first, last = (np.searchsorted(prepared.epochs.first, c) for c in (where.stop_first, where.stop_last))
     out = np.full(len(prepared.epochs), -1)
     for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
-        out[a:b:_PIECE] = k
+        out[a:b:PIECE] = k
     return out

@@ -45,29 +45,77 @@ def correct_cycles(cycles: Cycles, seen: Motion, model: ImuModel, coefficients: 
         Near the true motion of the same cycles.
     coefficients : ndarray, shape (p,)
     """
+    weight = slope_weight(seen, model, coefficients)
+    return corrected(cycles, seen, weight, errors_along(model.sized(coefficients), seen))
+
+
+def slope_weight(seen: Motion, model: ImuModel, coefficients: Floats) -> Floats:
+    """``(I + S)^-1`` of every cycle, shape (n, 6, 6): change of true rate and force per change of the measured ones.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (p,)
+        SI.
+    """
     rows = slice(0, 1) if slope_is_constant(model, coefficients) else slice(None)
     inverse = np.linalg.inv(np.eye(6) + error_slope(model, seen, rows, coefficients))
-    weight = np.ascontiguousarray(np.broadcast_to(inverse, (len(cycles), 6, 6)))
-    dt = cycles.dt[:, None]
-    near = np.hstack([seen.w, seen.f])
-    defect = np.hstack([cycles.alpha, cycles.upsilon]) / dt - near - errors_along(model.sized(coefficients), seen)
-    true = near + np.einsum("kij,kj->ki", weight, defect)
-    corrected = replace(
-        cycles,
-        alpha=true[:, :3] * dt,
-        upsilon=true[:, 3:] * dt,
-        coning=_crossed(weight[:, :3, :3], cycles.coning),
-        # Of two different vectors: right to the difference of the triads' errors times the correction itself.
-        sculling=_crossed(weight[:, 3:, 3:], cycles.sculling),
-    )
-    return CorrectedCycles(corrected, replace(seen, w=true[:, :3], f=true[:, 3:]), weight)
+    return np.ascontiguousarray(np.broadcast_to(inverse, (len(seen.t), 6, 6)))
 
 
-def _crossed(U: Floats, product: Floats) -> Floats:
-    """Cross products of vectors that go through `U` (n, 3, 3): the products (n, 3) go through its cofactors."""
-    rows = U.transpose(1, 0, 2)
-    cofactor = [np.cross(rows[(k + 1) % 3], rows[(k + 2) % 3]) for k in range(3)]
-    return np.column_stack([np.einsum("kj,kj->k", row, product) for row in cofactor])
+def corrected(cycles: Cycles, seen: Motion, weight: Floats, errors: Floats) -> CorrectedCycles:
+    """Correct cycles by one Newton step from a motion near the true one.
+
+    Parameters
+    ----------
+    cycles : Cycles
+        As measured, n of them.
+    seen : Motion
+        Near the true motion of the same cycles.
+    weight : ndarray, shape (n, 6, 6)
+        As `slope_weight` gives it.
+    errors : ndarray, shape (n, 6)
+        Sensor errors along `seen` (rad/s, m/s^2).
+    """
+    dt, near = cycles.dt[:, None], np.hstack([seen.w, seen.f])
+    true, coning, sculling = np.empty_like(near), np.empty((len(near), 3)), np.empty((len(near), 3))
+    _newton(cycles.dt, cycles.alpha, cycles.upsilon, near, weight, errors, true)
+    _crossed(weight, 0, cycles.coning, coning)
+    # Of two different vectors: right to the difference of the triads' errors times the correction itself.
+    _crossed(weight, 3, cycles.sculling, sculling)
+    taken_out = replace(cycles, alpha=true[:, :3] * dt, upsilon=true[:, 3:] * dt, coning=coning, sculling=sculling)
+    return CorrectedCycles(taken_out, replace(seen, w=true[:, :3], f=true[:, 3:]), weight)
+
+
+@compiled
+def _newton(
+    dt: Floats, alpha: Floats, upsilon: Floats, near: Floats, weight: Floats, errors: Floats, true: Floats
+) -> None:
+    """Fill true rate and force (n, 6) of cycles by one step from those `near` them (n, 6)."""
+    defect = np.empty(6)
+    for k in range(dt.shape[0]):
+        for i in range(3):
+            defect[i] = alpha[k, i] / dt[k] - near[k, i] - errors[k, i]
+            defect[3 + i] = upsilon[k, i] / dt[k] - near[k, 3 + i] - errors[k, 3 + i]
+        for i in range(6):
+            true[k, i] = near[k, i]
+            for j in range(6):
+                true[k, i] += weight[k, i, j] * defect[j]
+
+
+@compiled
+def _crossed(weight: Floats, first: int, product: Floats, out: Floats) -> None:
+    """Fill cross products (n, 3) of vectors that go through the block of `weight` from row and column `first` on.
+
+    The products go through its cofactors.
+    """
+    for k in range(product.shape[0]):
+        for i in range(3):
+            a, b = first + (i + 1) % 3, first + (i + 2) % 3
+            out[k, i] = 0.0
+            for j in range(3):
+                c, d = first + (j + 1) % 3, first + (j + 2) % 3
+                cofactor = weight[k, a, c] * weight[k, b, d] - weight[k, a, d] * weight[k, b, c]
+                out[k, i] += cofactor * product[k, j]
 
 
 def spread(values: Floats, channel: Ints, parameter: Ints, weight: Floats) -> tuple[Floats, Ints, Ints]:
