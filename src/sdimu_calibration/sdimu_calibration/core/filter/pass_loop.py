@@ -80,7 +80,7 @@ def until_nothing_moves(
     for count in range(1, MOST_PASSES + 1):
         progress("passes", min(0.95, 0.2 + 0.05 * count))
         last = run(at, loose)
-        moved = _furthest_move(last.estimate - at.coefficients, last.covariance)
+        moved = furthest_move(last.estimate - at.coefficients, last.covariance)
         at = StartPoint(last.smoothed_start, last.estimate)
         if not loose and moved < CONVERGED:
             return last, count, True
@@ -88,7 +88,7 @@ def until_nothing_moves(
     return last, MOST_PASSES, False
 
 
-def _furthest_move(step: Floats, covariance: Floats) -> float:
+def furthest_move(step: Floats, covariance: Floats) -> float:
     """Largest step (p,) of a coefficient, in its sigma (1); those that are known have a covariance of zero."""
     sigma = np.sqrt(np.diag(covariance))
     free = sigma > 0.0
