@@ -139,7 +139,7 @@ def test_what_fails_where_it_was_not_fitted_is_not_called_certain_nor_to_be_trus
 def test_another_time_constant_of_one_coefficient_makes_no_class(summary, alike, word):
     label = "gyro_bias_warm_up_x(tau=600 s)"
     assert verdict(Facts([(label, alike)])) == word
-    of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
+    of_set = SetFinding(label, "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", alike)
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None})
     assert verdict_of_set(SetFacts([of_set], after, SimpleNamespace(function=None, reports=()), None, None)) == word
 
@@ -288,7 +288,7 @@ def test_a_set_of_which_recordings_have_functions_of_their_own_is_unexplained(su
 
 def test_a_fault_of_one_recording_does_not_hide_what_another_one_has(summary):
     after = replace(summary.diagnosis.after, of_set=None, fit={"held_out_rms": None}, warnings=())
-    fault = SetFinding("gyro_bias_step_x(t0=9 s)", "", "r2", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.99)
+    fault = SetFinding("gyro_bias_step_x(t0=9 s)", "r2", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.99)
     told = Probabilities(0.9, (), ())
     for name, word in (("r1", Verdict.UNEXPLAINED), ("r2", Verdict.DATA_FAULT)):
         own = [FunctionShare(name, 0.97, ("accel_x",))]
@@ -417,7 +417,7 @@ def test_noise_of_the_data_sheet_is_no_part_of_what_is_unexplained(summary):
 
 def test_what_a_set_finds_beside_what_is_unexplained_has_its_grade(summary):
     label = "gyro_bias_warm_up_x(tau=600 s)"
-    of_set = SetFinding(label, "", "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.7, (Share("gyro_bias_warm_up_x", 0.7),))
+    of_set = SetFinding(label, "", 1e-6, 1e-7, 9.0, "rad/s", "deg/h", (), 0.7, (Share("gyro_bias_warm_up_x", 0.7),))
     after = replace(summary.diagnosis.after, of_set=None, warnings=())
     facts = SetFacts([of_set], after, SimpleNamespace(function=None, reports=()), None, None)
     words = " ".join(statements_of_set(Verdict.UNEXPLAINED, facts))

@@ -68,9 +68,9 @@ class Stage:
             self.asked.append("without")
             return Found("without")
 
-        def search_beside(*_):
-            self.asked.append("beside")
-            return self.beside
+        def search_about(_, __, request, asks=False):
+            self.asked += ["beside"] if asks else [f"with {one}" for one in request.extra]
+            return self.beside if asks else self.wider
 
         def with_function(_, sensors, __):
             self.asked += [f"function of {one}" for one in sensors]
@@ -81,17 +81,12 @@ class Stage:
             self.asked.append(f"left by {fit}")
             return SimpleNamespace(where=(f"left by {fit}",))
 
-        def search_with(_, extra, __):
-            self.asked += [f"with {one}" for one in extra]
-            return self.wider
-
         for name, what in (
             ("asks_for_equations", lambda _: self.near is not None),
             ("near_equations", lambda *_: self.near),
-            ("search_with", search_with),
             ("search_set", lambda *_: self.first),
             ("search_without", without),
-            ("search_beside", search_beside),
+            ("search_about", search_about),
             ("with_function", with_function),
             ("following", lambda *_: self.follows),
             ("leftovers", leftovers),

@@ -17,7 +17,7 @@ from sdimu_calibration.core.joint.near_equations import asks_for_equations, near
 from sdimu_calibration.core.joint.recurrence import Recurrence, recurrence
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch, following
-from sdimu_calibration.core.joint.set_search import SetRequest, search_beside, search_set, search_with, search_without
+from sdimu_calibration.core.joint.set_search import SetRequest, search_about, search_set, search_without
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,12 @@ def searched(members: Sequence[Member], request: SetRequest, fitted: SetFit | No
     near = near_equations(done.found, request.run)
     if not near:
         return done
-    found = search_with(done.found, near, request)
+    wider = replace(request, extra=(*request.extra, *near))
+    found = search_about(done.found, done.found.after, wider)
     if not any(c.family == "own" for c in found.chosen):
         return done
     if found.after.function is not None and not found.function_is_likely:
-        found = search_without(found, replace(request, extra=(*request.extra, *near)))
+        found = search_without(found, wider)
     left = leftovers(found.alone, request.run, found.before.names)
     return Searched(found, None, recurrence(left), (), left.where)
 
@@ -70,7 +71,7 @@ def _without_equations(members: Sequence[Member], request: SetRequest, fitted: S
         # Some recording may have an error that follows the attitude, or what is left may come back with it.
         returns = again.sensors if again.may_come_back(ATTITUDE) else ()
         fit = with_function(found.after, following(found.posterior, NAMED) or returns, request.run)
-        beside = search_beside(found, fit, request) if fit.function else None
+        beside = search_about(found, fit, request, asks=True) if fit.function else None
     if beside is None:
         return Searched(found, None, again, (), left.where)
     functions = beside.functions if beside.stood else ()

@@ -16,7 +16,6 @@ from sdimu_calibration.core.diagnosis.rounds import TO_AND_FRO
 from sdimu_calibration.core.diagnosis.search import Search
 from sdimu_calibration.core.effects.effect import Effect
 from sdimu_calibration.core.effects.references import LATITUDE, SEEN_AS_GRAVITY
-from sdimu_calibration.core.effects.selection import resolve
 from sdimu_calibration.core.evidence.known import Standing
 from sdimu_calibration.core.joint.changed import is_change
 from sdimu_calibration.core.joint.function_fit import unknown_functions
@@ -25,13 +24,13 @@ from sdimu_calibration.core.joint.leftovers import StopError
 from sdimu_calibration.core.joint.member import Member
 from sdimu_calibration.core.joint.recurrence import Recurrence
 from sdimu_calibration.core.joint.recurrence_words import listed, next_steps
-from sdimu_calibration.core.joint.scope import split_tag, tagged
+from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, differences
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions
 from sdimu_calibration.core.joint.set_found import FunctionShare, SetSearch
 from sdimu_calibration.core.joint.set_ladder import SetLadder, set_ladder
 from sdimu_calibration.core.joint.set_result import SCATTERS, averaged, set_outcome
-from sdimu_calibration.core.joint.set_search import SetRequest, place_of, place_of_local
+from sdimu_calibration.core.joint.set_search import SetRequest, place_of
 from sdimu_calibration.core.joint.set_verdict import SetFacts, SetFinding, statements, verdict_of_set
 from sdimu_calibration.core.noise_term import unexplained
 from sdimu_calibration.core.plain_text import capital, first_of, listing
@@ -57,8 +56,6 @@ class SetDiagnosis:
     before: Calibration
     after: Calibration
     """`before`, `after`: with the model as given, and with what was found."""
-    threshold: float
-    """Score that noise reaches in a scan."""
     advice: tuple[Advice, ...]
     standing: Standing
     """What the set knows of the unit: what a plan for the next recording begins with."""
@@ -126,7 +123,6 @@ def diagnose_set(
         tuple(facts.findings),
         before,
         facts.after if found.stood else facts.after.warned(TO_AND_FRO),
-        found.threshold,
         recorded_first((*kept, *_advice(word, facts.findings, _closing(found.after, standing), steps))),
         standing,
         found.first,
@@ -167,33 +163,20 @@ def _explained(again: Recurrence | None, found: SetSearch, labels: Sequence[str]
 
 
 def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
-    names = list(found.after.names)
+    names, recordings = list(found.after.names), [report.name for report in found.after.reports]
     values, sigma = _differences(found.after)
-    shared = [
-        (
-            *(c.label, c.effect.title, "", place_of(names, c), z, c.parameter),
-            *(found.alike.get(c.label, ()), found.probability.get(c.label, float("nan")), c.family),
+    out = []
+    for find in found.finds:
+        one, place = find.candidate, place_of(names, find.candidate)
+        label = split_tag(one.label)[0] if one.recording else one.label
+        unit, shown = one.parameter.unit, one.parameter.display_unit
+        out.append(
+            SetFinding(
+                *(label, one.recording, float(values[place]), float(sigma[place]), find.z, unit, shown),
+                *(find.alike, find.probability, find.may_be, _against(label, one.recording, recordings), one.family),
+            )
         )
-        for c, z in zip(found.chosen, found.z, strict=True)
-    ]
-    own = []
-    for find in found.local:
-        effect = resolve(find.key)
-        parameter = effect.parameters[0]
-        place = place_of_local(names, find)
-        title = f"{effect.title}, changed" if is_change(find.key) else effect.title
-        family = effect.family or effect.name
-        own.append((find.key, title, find.recording, place, find.z, parameter, (), find.probability, family))
-    recordings = [report.name for report in found.after.reports]
-    return tuple(
-        SetFinding(
-            *(label, title, recording, float(values[k]), float(sigma[k]), float(z), p.unit, p.display_unit),
-            *(tuple(alike), probability, found.may_be.get(tagged(label, recording) if recording else label, ())),
-            _against(label, recording, recordings),
-            family,
-        )
-        for label, title, recording, k, z, p, alike, probability, family in (*shared, *own)
-    )
+    return tuple(out)
 
 
 def _added(found: SetSearch, findings: Sequence[SetFinding]) -> list[Advice]:

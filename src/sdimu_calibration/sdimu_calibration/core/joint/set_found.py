@@ -13,7 +13,7 @@ from sdimu_calibration.core.effects import selection
 from sdimu_calibration.core.effects.effect import CHANNELS
 from sdimu_calibration.core.evidence.candidate import Candidate, split
 from sdimu_calibration.core.evidence.known import Standing
-from sdimu_calibration.core.joint.scope import split_tag, tagged
+from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_noise import SetNoise
@@ -24,20 +24,18 @@ from sdimu_calibration.core.posterior.told import Share
 
 
 @dataclass(frozen=True)
-class LocalFind:
-    """An effect of one recording."""
+class Find:
+    """An effect that was found, in all recordings or in one."""
 
-    recording: str
-    key: str
+    candidate: Candidate
     z: float
     """Score beside what was found before it."""
+    alike: tuple[str, ...]
+    """What the set cannot tell from it; not told of what is of one recording."""
     probability: float
     """That it or something of its class is there (1)."""
-
-    @property
-    def label(self) -> str:
-        """Key with the name of the recording behind it."""
-        return tagged(self.key, self.recording)
+    may_be: tuple[Share, ...]
+    """Coefficients of its class with the probability of each."""
 
 
 @dataclass(frozen=True)
@@ -68,19 +66,8 @@ class SetSearch:
     before: SetFit
     after: SetFit
     """`before`, `after`: with the model as given, and with what was found."""
-    chosen: tuple[Candidate, ...]
-    """Effects in all recordings, the largest share of the misfit first."""
-    z: tuple[float, ...]
-    """Score of each beside those before it."""
-    alike: dict[str, tuple[str, ...]]
-    """By label, what the set cannot tell from it."""
-    probability: dict[str, float]
-    """By label, that it or one of these is in all recordings (1)."""
-    may_be: dict[str, tuple[Share, ...]]
-    """By label, coefficients of its class with the probability of each; of what is of one recording, too."""
-    local: tuple[LocalFind, ...]
-    threshold: float
-    """Score that noise reaches in a scan of the joint evidence."""
+    finds: tuple[Find, ...]
+    """Effects in all recordings, the largest share of the misfit first; then those of single ones."""
     first: Search[SetEvidence]
     """Of the first round: its scan."""
     standing: Standing
@@ -95,7 +82,12 @@ class SetSearch:
     @property
     def told(self) -> tuple[Candidate, ...]:
         """What was found, in all recordings or in one."""
-        return (*self.chosen, *(of_one_recording(one.label) for one in self.local))
+        return tuple(find.candidate for find in self.finds)
+
+    @property
+    def chosen(self) -> tuple[Candidate, ...]:
+        """What was found in all recordings."""
+        return tuple(candidate for candidate in self.told if not candidate.recording)
 
     @property
     def any_function(self) -> float:

@@ -29,7 +29,7 @@ from sdimu_calibration.core.joint.scope import by_name, is_shared, split_tag, ta
 from sdimu_calibration.core.joint.set_board import SetBoard
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, set_evidence
 from sdimu_calibration.core.joint.set_fit import Run, SetFit, SetOptions, asked_again, fit_set, with_reports
-from sdimu_calibration.core.joint.set_found import LocalFind, SetSearch, following, likeliest_alone, of_one_recording
+from sdimu_calibration.core.joint.set_found import Find, SetSearch, following, likeliest_alone, of_one_recording
 from sdimu_calibration.core.joint.set_standing import set_standing
 from sdimu_calibration.core.posterior.posterior import PROBABLE, Posterior
 from sdimu_calibration.core.posterior.told import Share, may_be, of_coefficients
@@ -82,32 +82,19 @@ def search_set(members: Sequence[Member], request: SetRequest, fitted: SetFit | 
 def search_without(found: SetSearch, request: SetRequest) -> SetSearch:
     """Search again without the function that a search asked for; what was found is a candidate again."""
     again = _searched(found.before, request.fit(found.told, found.before), found.told, request, asks=False)
-    return replace(again, first=found.first, threshold=found.threshold)
+    return replace(again, first=found.first)
 
 
-def search_beside(found: SetSearch, fit: SetFit, request: SetRequest) -> SetSearch:
-    """Search again where a fit has a function that all recordings share; what was found is a candidate again.
-
-    Parameters
-    ----------
-    fit : SetFit
-        With the function and with what was found.
-    """
-    again = _searched(found.before, fit, found.told, request)
-    return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
-
-
-def search_with(found: SetSearch, extra: Sequence[Effect], request: SetRequest) -> SetSearch:
-    """Search again with more candidates; what was found is a candidate again.
+def search_about(found: SetSearch, fit: SetFit, request: SetRequest, asks: bool = False) -> SetSearch:
+    """Search again about a fit with what was found, beside a function or with more candidates: all is one again.
 
     Parameters
     ----------
-    extra : sequence of Effect
-        Tried with the catalogue.
+    asks : bool
+        As of `_searched`.
     """
-    wider = replace(request, extra=(*request.extra, *extra))
-    again = _searched(found.before, found.after, found.told, wider, asks=False)
-    return replace(again, first=found.first, threshold=found.threshold, alone=found.alone)
+    again = _searched(found.before, fit, found.told, request, asks)
+    return replace(again, first=found.first, alone=found.alone)
 
 
 def _searched(
@@ -183,30 +170,15 @@ def _result(
         raise AssertionError("a search weighs models")
     z = {step.label: step.z for step in last.steps}
     # A window that chooses something else does not say how probable this is.
-    classes = {c.label: _class(window, c.label) if stood else ((), float("nan"), ()) for c in told}
-    shared = {c.label: c for c in told if not c.recording}
-    alike = {label: classes[label][0] for label in shared}
-    local = tuple(
-        LocalFind(c.recording, split_tag(c.label)[0], z.get(c.label, float("nan")), classes[c.label][1])
-        for c in told
-        if c.recording
-    )
-    result = SetSearch(
-        before,
-        fit,
-        tuple(shared.values()),
-        tuple(z.get(label, float("nan")) for label in shared),
-        alike,
-        {label: classes[label][1] for label in shared},
-        {label: one[2] for label, one in classes.items()},
-        local,
-        first.threshold,
-        first,
-        set_standing(fit, evidence if shared else set_evidence(fit, ()), shared, alike),
-        window,
-        stood,
-        fit,
-    )
+    nothing: tuple[tuple[str, ...], float, tuple[Share, ...]] = ((), float("nan"), ())
+    finds: list[Find] = []
+    for one in sorted(told, key=lambda c: bool(c.recording)):
+        alike, probability, shares = _class(window, one.label) if stood else nothing
+        own = of_one_recording(one.label) if one.recording else one
+        finds.append(Find(own, z.get(one.label, float("nan")), () if one.recording else alike, probability, shares))
+    shared = [find for find in finds if not find.candidate.recording]
+    standing = set_standing(fit, evidence if shared else set_evidence(fit, ()), shared)
+    result = SetSearch(before, fit, tuple(finds), first, standing, window, stood, fit)
     function = fit.function
     if function is None:
         return result
@@ -227,9 +199,9 @@ def _in_own_functions(found: SetSearch, full: SetFit, evidence: SetEvidence) -> 
     if common or not found.stood or noise is None or not isinstance(board, SetBoard):
         return found
     own = [board.functions.own(sizes) for sizes in noise.own_functions]
-    fit, shared = with_own_functions(found.after, own), {c.label: c for c in found.chosen}
+    fit, shared = with_own_functions(found.after, own), [f for f in found.finds if not f.candidate.recording]
     about = set_evidence(with_own_functions(full, own), evidence.candidates) if shared else set_evidence(fit, ())
-    return replace(found, after=fit, standing=set_standing(fit, about, shared, found.alike))
+    return replace(found, after=fit, standing=set_standing(fit, about, shared))
 
 
 def _with(options: SetOptions, told: Sequence[Candidate]) -> SetOptions:
@@ -354,12 +326,6 @@ def _class(found: Posterior[SetEvidence], label: str) -> tuple[tuple[str, ...], 
             others = tuple(c.label for c in together if c.coefficient != own.coefficient)
             return others, found.of_class(place), may_be(found, place)
     return (), next((s.probability for s in of_coefficients(found) if s.name == label), 0.0), ()
-
-
-def place_of_local(names: Sequence[str], find: LocalFind) -> int:
-    """Place among those of a fit of a coefficient that was found in one recording."""
-    called = (tagged(name, find.recording) for name in (find.key, selection.resolve(find.key).parameters[0].name))
-    return next(list(names).index(name) for name in called if name in names)
 
 
 def places_of_chosen(found: SetSearch) -> list[int]:

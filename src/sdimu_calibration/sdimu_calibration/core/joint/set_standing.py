@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from sdimu_calibration.core.effects import imu_model
-from sdimu_calibration.core.evidence.candidate import Candidate
 from sdimu_calibration.core.evidence.known import Standing, class_of, in_frame_of_priors, is_lasting, known_of
 from sdimu_calibration.core.joint.set_evidence import SetEvidence
 from sdimu_calibration.core.joint.set_fit import SetFit
+from sdimu_calibration.core.joint.set_found import Find
 
 
-def set_standing(
-    fit: SetFit, evidence: SetEvidence, kept: Mapping[str, Candidate], alike: Mapping[str, Sequence[str]]
-) -> Standing:
+def set_standing(fit: SetFit, evidence: SetEvidence, finds: Sequence[Find]) -> Standing:
     """Say what all recordings of a set know of the unit.
 
     Parameters
@@ -26,18 +24,17 @@ def set_standing(
         With everything that was found.
     evidence : SetEvidence
         About it, with the candidates that may look the same.
-    kept : mapping of str to Candidate
-        What was found, by label.
-    alike : mapping of str to sequence of str
-        By label, what the set cannot tell from it.
+    finds : sequence of Find
+        What was found in all recordings.
     """
     place = {name: k for k, name in enumerate(evidence.names)}
     first = len(evidence.weight)
     more: dict[str, int] = {}
+    kept = {find.candidate.label: find.candidate for find in finds}
     classes, labels = [], dict.fromkeys(label for label, c in kept.items() if is_lasting(c.effect))
-    for label, found in kept.items():
-        others = [evidence.candidates[place[name] - first] for name in alike.get(label, ()) if name in place]
-        members = class_of(found, others)
+    for find in finds:
+        others = [evidence.candidates[place[name] - first] for name in find.alike if name in place]
+        members = class_of(find.candidate, others)
         if members:
             classes.append(tuple(c.label for c in members))
             labels |= dict.fromkeys(classes[-1])

@@ -40,7 +40,6 @@ class SetFinding:
     """An effect that was found."""
 
     label: str
-    title: str
     recording: str
     """The only one that shows it; empty where all do."""
     value: float
