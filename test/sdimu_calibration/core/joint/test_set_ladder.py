@@ -20,7 +20,7 @@ from sdimu_calibration.storage.files.diagnosis_file import read_diagnosis, write
 
 from .conftest import here, short, unit_set
 
-AS_IT_IS = set_ladder._Model("", frozenset())
+AS_IT_IS = ("", frozenset())
 
 
 @pytest.fixture(scope="module")
@@ -69,16 +69,16 @@ def test_a_recording_is_navigated_without_anything_of_its_own(two):
     first, second = two.reports
     rows = replace(first.reduction, y=first.reduction.y + 100.0)
     changed = replace(two, reports=(replace(first, reduction=rows), second))
-    told, same = (set_ladder._of_others(fit, fit.reports[0], AS_IT_IS) for fit in (two, changed))
+    told, same = (set_ladder._of_others(fit, fit.reports[0], *AS_IT_IS) for fit in (two, changed))
     assert np.array_equal(told.values, same.values)
     assert np.array_equal(told.covariance, same.covariance)
-    other = set_ladder._of_others(changed, changed.reports[1], AS_IT_IS)
-    assert not np.array_equal(other.values, set_ladder._of_others(two, second, AS_IT_IS).values)
+    other = set_ladder._of_others(changed, changed.reports[1], *AS_IT_IS)
+    assert not np.array_equal(other.values, set_ladder._of_others(two, second, *AS_IT_IS).values)
 
 
 def test_biases_of_another_power_on_have_its_scatter_and_what_a_model_lacks_is_zero(two):
     bias, lacking = two.names.index("gyro_bias_x"), two.names.index("accel_scale_x")
-    told = set_ladder._of_others(two, two.reports[0], set_ladder._Model("x", frozenset({"accel_scale_x"})))
+    told = set_ladder._of_others(two, two.reports[0], "x", {"accel_scale_x"})
     own = [told.names.index(two.names[k]) for k in (bias, lacking)]
     tau = {t.effect: t.sigma for t in two.turn_on}
     assert told.covariance[own[0], own[0]] > tau["gyro_bias"] ** 2 > 0.0

@@ -65,13 +65,8 @@ def in_size(fit: SetFit) -> SetFit:
     sizes = function_sizes(fit, fit.reports, fit.function)
     shared = replace(fit.function, size=sizes.likeliest(fit.function.size))
     known = dict(zip(shared.labels, shared.known.tolist(), strict=True))
-
-    def in_prior(report: Report) -> Report:
-        rows = report.reduction
-        pairs = zip(rows.names, rows.weight.tolist(), strict=True)
-        return replace(report, reduction=replace(rows, weight=np.array([known.get(n, w) for n, w in pairs])))
-
-    return with_reports(replace(fit, function=shared), [in_prior(r) for r in fit.reports])
+    reports = [replace(r, reduction=r.reduction.in_prior(known)) for r in fit.reports]
+    return with_reports(replace(fit, function=shared), reports)
 
 
 def with_own_functions(fit: SetFit, own: Sequence[OwnWeights]) -> SetFit:

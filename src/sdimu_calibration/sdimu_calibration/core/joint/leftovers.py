@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from sdimu_calibration.core.arrays import Floats, Ints
 from sdimu_calibration.core.effects.effect import CHANNELS
@@ -136,7 +137,7 @@ def leftovers(fit: SetFit, run: Run, given: Sequence[str] = ()) -> Leftovers:
         own.append(np.hstack(wide))
         members += group
     every, P = stacked(rows), len(fit.names)
-    W = np.hstack([every.A, _block_diagonal(own)])
+    W = np.hstack([every.A, block_diag(*own)])
     full = Information(W.T @ W, W.T @ every.y)
     left = full.given(np.arange(P), fit.weight)
     asked = [reports[k] for k in members if reports[k].places is not None]
@@ -188,15 +189,6 @@ def _own(report: Report) -> Floats:
     """Columns of the dwells of a recording; none where they were not asked for."""
     rows = report.reduction
     return rows.A[:, len(rows.names) if report.places is not None else rows.A.shape[1] :]
-
-
-def _block_diagonal(blocks: Sequence[Floats]) -> Floats:
-    out = np.zeros((sum(len(b) for b in blocks), sum(b.shape[1] for b in blocks)))
-    row = column = 0
-    for block in blocks:
-        out[row : row + len(block), column : column + block.shape[1]] = block
-        row, column = row + len(block), column + block.shape[1]
-    return out
 
 
 def _scaled(J: Floats, d: Floats, reports: Sequence[Report], fit: SetFit) -> Leftovers:

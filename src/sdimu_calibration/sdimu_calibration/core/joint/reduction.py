@@ -9,7 +9,8 @@ Source: G. Bierman, *Factorization Methods for Discrete Sequential Estimation* (
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,6 +53,11 @@ class Reduction:
     """Number of measurements that were compressed."""
     unexplained: float
     """Sum of squares (1) that no parameter explains."""
+
+    def in_prior(self, weight: Mapping[str, float]) -> Reduction:
+        """Return the rows with other prior information (1/SI^2) of the coefficients that are named."""
+        pairs = zip(self.names, self.weight.tolist(), strict=True)
+        return replace(self, weight=np.array([weight.get(name, own) for name, own in pairs]))
 
 
 def reduced(evidence: LinearEvidence, terms: tuple[NoiseTerm, ...] = (), wander: Wander | None = None) -> Reduction:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sdimu_calibration.core.advice import Advice, Kind
-from sdimu_calibration.core.arrays import Floats
 from sdimu_calibration.core.diagnosis.advice import adding, recorded_first
 from sdimu_calibration.core.diagnosis.closing import Closing, closing_advice, next_recording
 from sdimu_calibration.core.diagnosis.grades import LISTED, size
@@ -164,7 +163,9 @@ def _explained(again: Recurrence | None, found: SetSearch, labels: Sequence[str]
 
 def _findings(found: SetSearch) -> tuple[SetFinding, ...]:
     names, recordings = list(found.after.names), [report.name for report in found.after.reports]
-    values, sigma = _differences(found.after)
+    # Those of one recording as differences from those of all others.
+    T, estimate = differences(names), found.after.estimate
+    values, sigma = T @ estimate.values, np.sqrt(np.diag(T @ estimate.covariance @ T.T))
     out = []
     for find in found.finds:
         one, place = find.candidate, place_of(names, find.candidate)
@@ -189,17 +190,6 @@ def _against(label: str, recording: str, recordings: Sequence[str]) -> str:
     """Name the other one of two recordings for a change that is told of one; empty for all else."""
     others = [name for name in recordings if name != recording]
     return others[0] if recording and len(others) == 1 and is_change(label) else ""
-
-
-def _differences(fit: SetFit) -> tuple[Floats, Floats]:
-    """Values and sigmas of a fit's coefficients (SI), those of one recording as differences from those of all others.
-
-    Returns
-    -------
-    values, sigma : ndarray, shape (P,)
-    """
-    T = differences(fit.names)
-    return T @ fit.estimate.values, np.sqrt(np.diag(T @ fit.estimate.covariance @ T.T))
 
 
 def sites_to_check(findings: Sequence[SetFinding]) -> list[Advice]:

@@ -45,7 +45,7 @@ class SetEvidence(LinearEvidence):
         raise NotImplementedError(f"signatures of {len(effects)} effects come with the reductions")
 
 
-def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[Candidate] = ()) -> SetEvidence:
+def set_evidence(fit: SetFit, candidates: Sequence[Candidate]) -> SetEvidence:
     """Put the rows of all recordings together.
 
     Parameters
@@ -53,11 +53,9 @@ def set_evidence(fit: SetFit, candidates: Sequence[Candidate], local: Sequence[C
     fit : SetFit
         Its reports have the signatures of the candidates.
     candidates : sequence of Candidate
-        The same in all recordings.
-    local : sequence of Candidate
-        Of single recordings, by labels with the name of the recording.
+        The same in all recordings, or of single ones, by labels with the name of the recording.
     """
-    tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in (*candidates, *local)]
+    tried = [replace(c, effect=replace(c.effect, nearer=None)) for c in candidates]
     names = (*fit.names, *(c.label for c in tried))
     P = len(fit.names)
     folds = [_white(fit, members, names) for members in _folds(fit)]

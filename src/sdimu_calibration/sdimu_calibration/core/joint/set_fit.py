@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, cast
@@ -216,7 +216,9 @@ def fit_set(
         raise DataError(f"only one of {len(members)} recordings can be used: mend or omit the others ({why})")
     fit = _in_shared_scatter(fit, options, run)
     waiting = {*late, *in_white} - {*left}
-    fit = _noise_of(waiting, fit, options, run) if waiting else fit
+    if waiting:
+        # In white noise until now: the point stands.
+        fit = _renewed(fit, [job_of(m, options, fit) for m in fit.members if m.name in waiting], run)
     return replace(fit, left_out=tuple(left.items()), unit_doubt=doubt)
 
 
@@ -228,11 +230,9 @@ def _first_job(member: Member, options: SetOptions, before: SetFit | None) -> Jo
     return job if by_itself else replace(job, noise=())
 
 
-def _noise_of(names: Collection[str], fit: SetFit, options: SetOptions, run: Run) -> SetFit:
-    """Learn the noise of recordings that were linearised in white noise, now that the point stands."""
-    members = [m for m in fit.members if m.name in names]
-    done = run([job_of(m, options, fit) for m in members])
-    fresh = {m.name: d for m, d in zip(members, done, strict=True) if not isinstance(d, DataError)}
+def _renewed(fit: SetFit, jobs: Sequence[Job], run: Run) -> SetFit:
+    """Return the fit with the rows that jobs give; a recording whose job fails keeps its own, as those without one."""
+    fresh = {job.member.name: d for job, d in zip(jobs, run(jobs), strict=True) if not isinstance(d, DataError)}
     return with_reports(fit, [with_own(fresh.get(r.name, r), r) for r in fit.reports])
 
 
@@ -242,17 +242,12 @@ def _in_shared_scatter(fit: SetFit, options: SetOptions, run: Run) -> SetFit:
     varying = [n for names in fit.varying.values() for n in names] if len(fit.power_ons) > 1 else []
     own = {r.name: {n: tagged(n, power_on(r)) for n in varying} for r in fit.reports}
     found = shared_scatter(runs, dict(zip(fit.names, fit.weight.tolist(), strict=True)), own)
-    asked = [k for k, r in enumerate(fit.reports) if r.name in runs and not _same(r.scatter, found.get(r.name))]
-    if not asked:
-        return fit
     jobs = [
-        replace(job_of(fit.members[k], options, fit), scatter=found.get(fit.reports[k].name), noise=()) for k in asked
+        replace(job_of(member, options, fit), scatter=found.get(r.name), noise=())
+        for member, r in zip(fit.members, fit.reports, strict=True)
+        if r.name in runs and not _same(r.scatter, found.get(r.name))
     ]
-    reports = list(fit.reports)
-    for k, fresh in zip(asked, run(jobs), strict=True):
-        if not isinstance(fresh, DataError):
-            reports[k] = with_own(fresh, fit.reports[k])
-    return with_reports(fit, reports)
+    return _renewed(fit, jobs, run) if jobs else fit
 
 
 def _same(one: Floats | None, other: Floats | None) -> bool:
@@ -279,31 +274,19 @@ def job_of(member: Member, options: SetOptions, about: SetFit | None, estimator:
         take up what the point leaves.
     """
     local = tuple(options.local.get(member.name, ()))
-    function = None if about is None else about.function
     if about is None:
         return Job(member, options.model, estimator or options.estimator, local)
     report = next((r for r in about.reports if r.name == member.name), None)
-    if report is not None and local != tuple(about.local.get(member.name, ())):
+    if report is None:
+        values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
+        estimator = estimator or about.reports[0].estimator
+        return Job(member, options.model, estimator, local, about=values, noise=(), function=about.function)
+    job = Job(member, options.model, report.estimator, local, imu=report.imu, function=about.function)
+    if local != tuple(about.local.get(member.name, ())):
         # What is new in it alone may be far outside its prior, which its own fit widens: else noise takes the rest.
-        return Job(member, options.model, report.estimator, local, imu=report.imu, function=function)
-    if report is not None:
-        return Job(
-            member,
-            options.model,
-            report.estimator,
-            local,
-            (),
-            False,
-            about.values_of(report),
-            report.imu,
-            report.start,
-            None if learn else report.noise,
-            report.scatter,
-            function=function,
-        )
-    values = dict(zip(about.names, about.estimate.values.tolist(), strict=True))
-    estimator = estimator or about.reports[0].estimator
-    return Job(member, options.model, estimator, local, about=values, noise=(), function=function)
+        return job
+    noise = None if learn else report.noise
+    return replace(job, about=about.values_of(report), start=report.start, noise=noise, scatter=report.scatter)
 
 
 def asked_again(fit: SetFit, run: Run, places: Sequence[int] | None = None, **wanted: Any) -> list[Report]:
@@ -335,8 +318,7 @@ def with_own(fresh: Report, old: Report | None) -> Report:
         return fresh
     own = old.reduction
     known = {n: w for n, w in zip(own.names, own.weight.tolist(), strict=True) if not is_weight(n)}
-    pairs = zip(fresh.reduction.names, fresh.reduction.weight.tolist(), strict=True)
-    rows = replace(fresh.reduction, weight=np.array([known.get(name, weight) for name, weight in pairs]))
+    rows = fresh.reduction.in_prior(known)
     if any(map(is_weight, rows.names)):
         fresh = replace(fresh, statistics=old.statistics)
     return replace(

@@ -49,17 +49,6 @@ class SetLadder:
         return self.rungs[0][1] if self.rungs else float("nan")
 
 
-@dataclass(frozen=True)
-class _Model:
-    added: str
-    lacks: frozenset[str]
-    """Coefficients of the fit that it has not."""
-
-    @property
-    def name(self) -> str:
-        return rung_name(self.added)
-
-
 def set_ladder(found: SetSearch, run: Run) -> SetLadder:
     """Say how wrong a set is with the first, the first two, ... of what was found in all recordings.
 
@@ -70,10 +59,12 @@ def set_ladder(found: SetSearch, run: Run) -> SetLadder:
     run : callable
         Does the jobs.
     """
-    fit, models = found.after, _models(found)
-    rungs = tuple((model.added, _error(fit, model)) for model in models)
+    fit, added = found.after, ("", *(c.label for c in found.chosen))
+    columns = [fit.names[place] for place in places_of_chosen(found)]
+    lacks = [frozenset(columns[k:]) for k in range(len(added))]
+    rungs = tuple((label, _error(fit, without)) for label, without in zip(added, lacks, strict=True))
     # As on the ladder of one recording: the last model, where it is navigated, is what was found.
-    names = [*(model.name for model in models[:-1]), FOUND if len(models) > 1 else models[-1].name]
+    names = [*map(rung_name, added[:-1]), FOUND if len(added) > 1 else rung_name("")]
     places = _navigated(fit)
     if not places:
         return SetLadder(rungs, (), "runs by hand are not navigated without aid")
@@ -82,8 +73,7 @@ def set_ladder(found: SetSearch, run: Run) -> SetLadder:
         replace(
             job_of(fit.members[k], options, fit, learn=False),
             others=tuple(
-                replace(_of_others(fit, fit.reports[k], model), model=name)
-                for model, name in zip(models, names, strict=True)
+                _of_others(fit, fit.reports[k], name, without) for name, without in zip(names, lacks, strict=True)
             ),
         )
         for k in places
@@ -93,15 +83,8 @@ def set_ladder(found: SetSearch, run: Run) -> SetLadder:
     return SetLadder(rungs, runs, "" if runs else "the recordings are too short")
 
 
-def _models(found: SetSearch) -> list[_Model]:
-    """Models from that as given on, with one effect more each."""
-    columns = [found.after.names[place] for place in places_of_chosen(found)]
-    labels = ("", *(c.label for c in found.chosen))
-    return [_Model(label, frozenset(columns[k:])) for k, label in enumerate(labels)]
-
-
-def _error(fit: SetFit, model: _Model) -> float:
-    told = held_out(fit, sorted(model.lacks))
+def _error(fit: SetFit, lacks: Collection[str]) -> float:
+    told = held_out(fit, sorted(lacks))
     return float("nan") if told is None else told.rms
 
 
@@ -115,16 +98,17 @@ def _navigated(fit: SetFit) -> list[int]:
     return [sound[k] for k in spread.tolist()]
 
 
-def _of_others(fit: SetFit, report: Report, model: _Model) -> OfOthers:
+def _of_others(fit: SetFit, report: Report, name: str, lacks: Collection[str]) -> OfOthers:
     """Say what all other power-ons tell of the unit (where there is one, all other recordings), with a model.
 
-    In a power-on that they have not seen a coefficient may differ from their mean by its scatter.
+    `lacks` are coefficients of the fit that the model of this name has not. In a power-on that the others have not seen
+    a coefficient may differ from their mean by its scatter.
     """
     one = len(fit.power_ons) == 1
     others = [r for r in fit.reports if r is not report and (one or power_on(r) != power_on(report))]
-    kept = [name for name in fit.names if name not in model.lacks]
+    kept = [name for name in fit.names if name not in lacks]
     weight = fit.weight[[fit.names.index(name) for name in kept]]
-    varying = {} if one else _without(fit.varying, model.lacks)
+    varying = {} if one else _without(fit.varying, lacks)
     components = columns_of(varying, kept)
     tau = {t.effect: t.sigma for t in fit.turn_on}
     sizes = np.array([tau[c.effect] for c in components])
@@ -132,9 +116,9 @@ def _of_others(fit: SetFit, report: Report, model: _Model) -> OfOthers:
     covariance = estimate.covariance
     for component, size in zip(components, sizes.tolist(), strict=True):
         covariance[component.columns, component.columns] += size**2
-    every, total = (*kept, *sorted(model.lacks)), np.zeros((len(fit.names), len(fit.names)))
+    every, total = (*kept, *sorted(lacks)), np.zeros((len(fit.names), len(fit.names)))
     total[: len(kept), : len(kept)] = covariance
-    return OfOthers(model.name, every, np.concatenate([estimate.values, np.zeros(len(model.lacks))]), total)
+    return OfOthers(name, every, np.concatenate([estimate.values, np.zeros(len(lacks))]), total)
 
 
 def _without(varying: Mapping[str, Sequence[str]], lacks: Collection[str]) -> dict[str, tuple[str, ...]]:

@@ -235,7 +235,7 @@ def _evidence(fit: SetFit, request: SetRequest, finer: Sequence[Effect]) -> tupl
     changes = [change_of(label, reports[0].imu) for label in labels]
     shared = [c for effect in effects for c in split(effect)]
     full = replace(full, reports=tuple(reports))
-    return full, set_evidence(full, shared, [*local, *changes])
+    return full, set_evidence(full, [*shared, *local, *changes])
 
 
 def _reopened(evidence: SetEvidence, told: Sequence[Candidate]) -> tuple[Ints, list[Candidate]]:

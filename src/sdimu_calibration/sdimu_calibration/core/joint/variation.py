@@ -40,15 +40,10 @@ class Variation:
 
     names: tuple[str, ...]
     """Length p."""
-    recordings: tuple[str, ...]
-    """Length K."""
     z: Floats
-    """Shape (K, p). Deviation of the recording over its sigma; NaN where the recording says nothing of the coefficient.
-    """
-    deviation: Floats
-    """Shape (K, p). The same (SI): what the recording would add to the joint value."""
+    """Shape (K, p). Deviation of the recording over its sigma (1); NaN where it says nothing of the coefficient."""
     p_value: Floats
-    """Probability that coefficients that are constant scatter so far, shape (p,)."""
+    """Probability (1) that coefficients that are constant scatter so far, shape (p,)."""
     trends: tuple[SetTrend, ...]
     """The likeliest covariate of each coefficient, the least probable first."""
 
@@ -70,13 +65,10 @@ def variation(fit: SetFit) -> Variation:
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = own > _SEEN**2 * scores.alone
         z = np.where(seen, scores.d / np.sqrt(own), np.nan)
-        deviation = np.where(seen, scores.d / own, np.nan)
     p_value = np.array(
         [_scatter(scores.gram[c], scores.d[:, c], scores.alone[:, c], seen[:, c]) for c in range(len(shared))]
     )
-    return Variation(
-        tuple(shared), tuple(r.name for r in fit.reports), z, deviation, p_value, _trends(fit, shared, scores)
-    )
+    return Variation(tuple(shared), z, p_value, _trends(fit, shared, scores))
 
 
 def _scores(fit: SetFit, p: int) -> _Scores:
