@@ -251,7 +251,7 @@ def test_places_are_kept(tmp_path):
 
     leftovers(fit_set(unit_set(41, [FORTH, BACK]).members, OPTIONS, here), run)
     for report, back in kept:
-        for name in ("start", "end", "up", "temperature_degc"):
+        for name in ("middle", "up", "temperature_degc", "way"):
             np.testing.assert_array_equal(getattr(back.places, name), getattr(report.places, name))
 
 

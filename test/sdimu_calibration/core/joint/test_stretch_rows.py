@@ -37,7 +37,9 @@ def test_turns_are_trusted_as_their_noise_allows_and_dwells_as_in_white_noise():
         for axis in term.axes:
             S += U[:, :, first + axis] @ K @ U[:, :, first + axis].T
     count = len(places)
-    dwells = Stretches(places.start, places.end, np.arange(count), np.zeros(count, dtype=bool))
+    begin, end = np.array([stop[1:] for stop in evidence.times.stops]).T
+    np.testing.assert_allclose(places.middle, 0.5 * (begin + end), rtol=1e-12)
+    dwells = Stretches(begin, end, np.arange(count), np.zeros(count, dtype=bool))
     own = len(evidence.weight)
     W = np.hstack([evidence.W[:, :own], evidence.constant_signature(dwells)])
     kept, others = kept_and_others(evidence)

@@ -129,9 +129,9 @@ def leftovers(fit: SetFit, run: Run, given: Sequence[str] = ()) -> Leftovers:
     """
     reports = with_places(fit, run)
     fit = replace(fit, reports=tuple(reports))
-    rows, own, members = [], [], []
-    for name in fit.power_ons:
-        group = [k for k, r in enumerate(reports) if power_on(r) == name]
+    rows, own = [], []
+    members: list[int] = []
+    for group in fit.groups:
         white, wide = white_power_on(fit, group, fit.names, [_own(reports[k]) for k in group])
         rows.append(white)
         own.append(np.hstack(wide))

@@ -18,7 +18,7 @@ from sdimu_calibration.core.evidence.wander import Wander
 from sdimu_calibration.core.joint.function_prior import OF_FIT, FunctionPrior, OwnWeights
 from sdimu_calibration.core.joint.rival_noises import InOneNoise, in_its_noise
 from sdimu_calibration.core.joint.set_evidence import SetEvidence, own_values
-from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.set_noise import Layout, SetNoise
 from sdimu_calibration.core.joint.unit_noise import kind_of, log_prior_of_set
 from sdimu_calibration.core.noise_term import DRAWN, NoiseTerm
@@ -91,14 +91,12 @@ class SetBoard(Board[SetEvidence]):
     ) -> None:
         super().__init__(evidence, allowed, finer, wander, earlier)
         self.rivals = tuple(r.rivals or (in_its_noise(r.reduction),) for r in fit.reports)
-        names = [power_on(r) for r in fit.reports]
-        self._groups = [[k for k, name in enumerate(names) if name == one] for one in fit.power_ons]
+        self._groups = fit.groups
         self._names = tuple(told.get(name, name) for name in evidence.names)
         column = {name: k for k, name in enumerate(self._names)}
         self._own = [(column[fit.names[own]], column[fit.names[shared]]) for own, shared in own_values(fit.names)]
-        components = columns_of(fit.varying, fit.names) if fit.turn_on else []
-        self._varying = np.array([column[fit.names[k]] for c in components for k in c.columns], dtype=np.int64)
-        self._tau = np.array([t for c, t in zip(components, fit.tau, strict=True) for _ in c.columns])
+        self._varying = np.array([column[name] for name in fit.varying_names], dtype=np.int64)
+        self._tau = np.array([t for own, t in zip(fit.varying.values(), fit.tau, strict=False) for _ in own])
         self.functions = FunctionPrior(fit.function, evidence, usual_sizes(evidence.imu))
         self._layout = Layout(len(self.rivals), len(self.functions.counts))
         # In a single rest a function is a bias.

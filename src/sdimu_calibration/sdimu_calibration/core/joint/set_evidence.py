@@ -22,7 +22,7 @@ from sdimu_calibration.core.joint.combine import Rows, spread_out, stacked
 from sdimu_calibration.core.joint.joint_prior import prior_weight
 from sdimu_calibration.core.joint.reduction import compressed, unit_noise
 from sdimu_calibration.core.joint.scope import split_tag
-from sdimu_calibration.core.joint.set_fit import SetFit, columns_of, power_on
+from sdimu_calibration.core.joint.set_fit import SetFit, columns_of
 from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.probability import squares_tail
 
@@ -115,28 +115,22 @@ def differences(names: Sequence[str]) -> Floats:
     return D
 
 
-def _folds(fit: SetFit) -> list[list[list[int]]]:
+def _folds(fit: SetFit) -> Sequence[Sequence[Sequence[int]]]:
     """Folds of power-ons of recordings: by power-on where several were made, else each recording a fold."""
     if len(fit.power_ons) == 1:
         return [[[k]] for k in range(len(fit.reports))]
-    groups = [[k for k, r in enumerate(fit.reports) if power_on(r) == name] for name in fit.power_ons]
-    count = min(len(groups), MOST_FOLDS)
-    return [groups[fold::count] for fold in range(count)]
+    count = min(len(fit.groups), MOST_FOLDS)
+    return [fit.groups[fold::count] for fold in range(count)]
 
 
 def _white(fit: SetFit, groups: Sequence[Sequence[int]], names: Sequence[str]) -> Rows:
     """Rows of some power-ons in white noise, compressed to as many as there are parameters."""
-    done = [_of_power_on(fit, members, names) for members in groups]
-    rows = stacked(done)
+    rows = stacked([white_power_on(fit, members, names)[0] for members in groups])
     return rows if len(rows.y) <= len(names) else Rows(*compressed(rows.A, rows.y))
 
 
-def _of_power_on(fit: SetFit, members: Sequence[int], names: Sequence[str]) -> Rows:
-    return white_power_on(fit, members, names, [np.zeros((len(fit.reports[k].reduction.y), 0)) for k in members])[0]
-
-
 def white_power_on(
-    fit: SetFit, members: Sequence[int], names: Sequence[str], own: Sequence[Floats]
+    fit: SetFit, members: Sequence[int], names: Sequence[str], own: Sequence[Floats] = ()
 ) -> tuple[Rows, list[Floats]]:
     """Rows of one power-on in white noise: what it may differ by is part of the noise.
 
@@ -147,7 +141,7 @@ def white_power_on(
     names : sequence of str, length P
         Parameters of the rows.
     own : sequence of ndarray, shape (k, m)
-        Of each recording, columns that are zero in the rows of all others (per SI unit).
+        Of each recording, columns that are zero in the rows of all others (per SI unit); none has any without.
 
     Returns
     -------

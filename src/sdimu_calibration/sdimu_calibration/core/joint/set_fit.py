@@ -86,6 +86,12 @@ class SetFit:
         return tuple(dict.fromkeys(map(power_on, self.reports)))
 
     @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Places of the reports of each power-on."""
+        own = [power_on(r) for r in self.reports]
+        return tuple(tuple(k for k, name in enumerate(own) if name == one) for one in self.power_ons)
+
+    @cached_property
     def shown(self) -> tuple[int, ...]:
         """Places of the reports as tables list them: by start, those of one start in the order of the user."""
 

@@ -36,9 +36,8 @@ _READINGS = 9
 class Places:
     """Where the IMU was in each dwell of a recording, n of them."""
 
-    start: Floats
-    end: Floats
-    """`start`, `end`: seconds after the start of the recording (s), shape (n,)."""
+    middle: Floats
+    """Time of the middle of each: seconds after the start of the recording (s), shape (n,)."""
     up: Floats
     """Shape (n, 3). Direction of the mean specific force in b: a unit vector."""
     temperature_degc: Floats
@@ -48,18 +47,7 @@ class Places:
 
     def __len__(self) -> int:
         """Return the number of dwells."""
-        return len(self.start)
-
-    @property
-    def middle(self) -> Floats:
-        """Time of the middle of each dwell.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Seconds after the start of the recording (s).
-        """
-        return np.asarray(0.5 * (self.start + self.end))
+        return len(self.middle)
 
 
 def stretch_rows(fit: Fit) -> tuple[Reduction, Places]:
@@ -111,7 +99,7 @@ def _places(evidence: LinearEvidence, cut: Stretches, log: TemperatureLog | None
         up[k] = force / float(np.linalg.norm(force))
         if log is not None and len(log.t):
             heat[k] = np.interp(np.linspace(begin, end, _READINGS), log.t, log.value).mean()
-    return Places(cut.start, cut.end, up, heat, way(motion))
+    return Places(0.5 * (cut.start + cut.end), up, heat, way(motion))
 
 
 def _seen(evidence: LinearEvidence) -> Motion:

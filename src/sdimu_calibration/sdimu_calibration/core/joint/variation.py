@@ -20,7 +20,7 @@ from sdimu_calibration.core.joint.combine import spread_out
 from sdimu_calibration.core.joint.member import Report
 from sdimu_calibration.core.joint.scope import split_tag
 from sdimu_calibration.core.joint.set_evidence import white_power_on
-from sdimu_calibration.core.joint.set_fit import SetFit, power_on
+from sdimu_calibration.core.joint.set_fit import SetFit
 from sdimu_calibration.core.joint.shared_function import is_weight
 from sdimu_calibration.core.probability import chi2_tail, normal_tail
 from sdimu_calibration.core.results import SetTrend
@@ -77,8 +77,7 @@ def _scores(fit: SetFit, p: int) -> _Scores:
     d, X = np.zeros((K, p)), np.zeros((K, p, len(fit.names)))
     J = np.diag(fit.weight)
     within = np.zeros((p, K, K))
-    for group in fit.power_ons:
-        members = [k for k, r in enumerate(fit.reports) if power_on(r) == group]
+    for members in map(list, fit.groups):
         own = [spread_out(fit.reports[k].reduction, fit.names[:p]).A for k in members]
         rows, columns = white_power_on(fit, members, fit.names, own)
         a = np.stack(columns, axis=1)
