@@ -370,7 +370,7 @@ def _diagnosed(console: Console, paths: Sequence[Path], asked: Planned) -> Stand
 
     if len(paths) > 1:
         request = SetRequest(paths, StatedOpening(asked.site, asked.imu), FitRequest(asked.model))
-        found = diagnosed_set(console, request, ())[0]
+        found = diagnosed_set(console, request, ())
         say(console, f"{found.verdict}: {found.sentence}")
         return found.standing
     test = open_test(paths[0], asked.site, None if asked.imu is None else load_imu(asked.imu))

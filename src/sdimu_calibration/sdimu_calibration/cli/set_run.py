@@ -167,8 +167,8 @@ def diagnose_together(asked: SetRequest, extra: Sequence[Effect]) -> None:
 
     console = plain(stderr=asked.request.as_json)
     printed = printing(console, asked.request.pdf)
-    found, members = diagnosed_set(console, asked, extra)
-    after = _with_serial(found.after, members)
+    found = diagnosed_set(console, asked, extra)
+    after = found.after
     folder = _folder(asked, "diagnosis")
     about = to_repeat(asked, folder)
     with written_together(folder) as part:
@@ -212,16 +212,14 @@ def to_repeat(asked: SetRequest, folder: Path) -> Asked:
     return replace(about, options=["--set", str(asked.file), *about.options]) if asked.file else about
 
 
-def diagnosed_set(
-    console: Console, asked: SetRequest, extra: Sequence[Effect]
-) -> tuple[SetDiagnosis, tuple[Member, ...]]:
-    """Find what the model of a set misses; give its recordings, too."""
+def diagnosed_set(console: Console, asked: SetRequest, extra: Sequence[Effect]) -> SetDiagnosis:
+    """Find what the model of a set misses."""
     from sdimu_calibration.core.joint.set_diagnosis import diagnose_set
 
     with _begun(console, asked) as (members, options, run, progress):
         found = diagnose_set(members, options, run, extra, progress)
         progress("done", 1.0)
-    return found, members
+    return replace(found, after=_with_serial(found.after, members))
 
 
 @contextmanager

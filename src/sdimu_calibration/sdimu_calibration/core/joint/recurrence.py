@@ -156,11 +156,12 @@ def _weighed(left: Leftovers, main: Sequence[int]) -> dict[str, float]:
     """
     own = [part for g in np.unique(left.sensor) for part in _of_each(left, np.flatnonzero(left.sensor == g))]
     alone = _fitted(left, own, np.ones(len(own)))
-    by_size = {kind: _gains(left, own, alone, main, (kind,)) for kind in KINDS}
+    likelihood = _log_likelihood(left, own, alone)
+    by_size = {kind: _gains(left, own, alone, likelihood, main, (kind,)) for kind in KINDS}
     said = [kind for kind, gains in by_size.items() if np.ptp(gains) > _FLAT]
     gain: dict[tuple[str, ...], float] = {(): 0.0} | {(kind,): _mean(by_size[kind]) for kind in said}
     probable = [kind for kind in said if _share(gain, (kind,)) > _BOTH]
-    gain |= {both: _mean(_gains(left, own, alone, main, both)) for both in combinations(probable, 2)}
+    gain |= {both: _mean(_gains(left, own, alone, likelihood, main, both)) for both in combinations(probable, 2)}
     found = {kind: sum(_share(gain, kinds) for kinds in gain if kind in kinds) for kind in said}
     for alike in _in_one_order(left, said):
         # What a turn leaves in the stop behind it follows the order, whatever causes it.
@@ -198,14 +199,6 @@ class _Part:
     kernel: Floats
 
 
-@dataclass(frozen=True)
-class _Sizes:
-    """Variances of parts, and the log-likelihood of the scores with them (1)."""
-
-    sizes: Floats
-    log_likelihood: float
-
-
 def _of_each(left: Leftovers, mine: Ints) -> list[_Part]:
     """Scatter of a sensor, and its functions of each kind, of each recording alone."""
     square = np.ix_(mine, mine)
@@ -214,23 +207,28 @@ def _of_each(left: Leftovers, mine: Ints) -> list[_Part]:
     return [part for part in (_Part(mine, np.eye(len(mine))), *own) if part.kernel.any()]
 
 
-def _gains(left: Leftovers, own: list[_Part], alone: _Sizes, main: Sequence[int], kinds: tuple[str, ...]) -> Floats:
-    """Log-likelihood (1) that common functions of some kinds add, by their size; shape of `_SIZES`."""
+def _gains(
+    left: Leftovers, own: list[_Part], alone: Floats, likelihood: float, main: Sequence[int], kinds: tuple[str, ...]
+) -> Floats:
+    """Log-likelihood (1) that common functions of some kinds add, by their size; shape of `_SIZES`.
+
+    `alone` are the sizes of the parts of each recording without them, `likelihood` the log-likelihood with these (1).
+    """
     groups = [np.flatnonzero(left.sensor == g) for g in main]
     common = [_Part(mine, left.likeness[kind][np.ix_(mine, mine)]) for mine in groups for kind in kinds]
     if not any(part.kernel.any() for part in common):
         return np.zeros(len(_SIZES))
-    beside = _fitted(left, [*own, *common], np.concatenate([alone.sizes, np.ones(len(common))]))
+    beside = _fitted(left, [*own, *common], np.concatenate([alone, np.ones(len(common))]))
     # Sensors and kinds differ in size; how large all of them are together nobody knows.
-    shape = np.maximum(beside.sizes[len(own) :], _LEAST)
+    shape = np.maximum(beside[len(own) :], _LEAST)
     shape = shape / np.exp(np.mean(np.log(shape)))
     # Beside a small one the others are as large as alone, beside the likeliest as large as with it.
-    rest = (alone.sizes, beside.sizes[: len(own)])
+    rest = (alone, beside[: len(own)])
     by_size = [[_log_likelihood(left, [*own, *common], np.append(r, v * shape)) for r in rest] for v in _SIZES]
-    return np.asarray(np.max(by_size, axis=1) - alone.log_likelihood)
+    return np.asarray(np.max(by_size, axis=1) - likelihood)
 
 
-def _fitted(left: Leftovers, parts: Sequence[_Part], sizes: Floats) -> _Sizes:
+def _fitted(left: Leftovers, parts: Sequence[_Part], sizes: Floats) -> Floats:
     """Find the likeliest sizes of the parts, from some on."""
     m = len(left.score)
     for _ in range(_ROUNDS):
@@ -248,7 +246,7 @@ def _fitted(left: Leftovers, parts: Sequence[_Part], sizes: Floats) -> _Sizes:
         counts = sizes > _LEAST
         if np.all(np.abs(change[counts] - 1.0) < _STANDS):
             break
-    return _Sizes(sizes, _log_likelihood(left, parts, sizes))
+    return sizes
 
 
 def _covariance(m: int, parts: Sequence[_Part], sizes: Floats) -> Floats:
