@@ -38,9 +38,12 @@ _EVERY = 5
 tell most, and looking takes time."""
 _MOVED = 1.0
 """Movement since the last pass (sigma) from which passes are due: below it the next second of data counts for more."""
-_SHARE = 3.0
-"""Epochs that all passes may take in, over those that have come (1): their work is then a sixth of the filter's."""
-_AT_ONCE = 1500.0
+_GROWN = 1.1
+"""Length of the test over that at the last passes (1) from which others are due: right after some the estimate still
+moves, and passes five seconds later took what the next stop needed (mems_consumer was 10 sigma off after 6 stops)."""
+_SHARE = 6.0
+"""Epochs that all passes may take in, over those that have come (1): their work is then a third of the filter's."""
+_AT_ONCE = 3000.0
 """Epochs (1) that passes may take in beside that share: while a test is short there are as many as it wants."""
 
 
@@ -77,7 +80,7 @@ class LiveFilter:
         self._before: Motion | None = None
         self._acceleration = self._rested_s = 0.0
         self._history = LiveHistory()
-        self._loose, self._epochs, self._work = True, 0, 0
+        self._loose, self._epochs, self._work, self._looked = True, 0, 0, 0
         self._stood, self._force = 0, np.zeros(3)
         self._C_stop: Floats | None = None
         self._begun = (-1, 0.0, 0)  # present stop: its number, its first measured second, how often it began anew
@@ -114,7 +117,8 @@ class LiveFilter:
 
     def _due(self) -> bool:
         """Whether the estimate has moved so far that passes are worth their work, and what they take is left."""
-        if self._history.closed or self._work + self._epochs > _SHARE * self._epochs + _AT_ONCE:
+        spent = self._work + self._epochs > _SHARE * self._epochs + _AT_ONCE
+        if self._history.closed or spent or self._epochs < _GROWN * self._looked:
             return False
         state = self._deviation
         moved = np.concatenate([np.zeros(NAV), state.used, state.x[-COPY:]])
@@ -216,6 +220,7 @@ class LiveFilter:
 
     def _look_back(self) -> None:
         """Make passes over everything so far, about the present estimate, and go on from their end."""
+        self._looked = self._epochs
         prepared = self._history.prepared()
         if prepared is None:
             return

@@ -25,7 +25,7 @@ from sdimu_calibration.core.rotation import rotation_matrix
 _NEAR = 0.1
 """Movement of a coefficient (sigma) from one pass to the next at which no other is made: it leaves its square."""
 _MOST = 4
-"""Number of passes (1) at a time at most: where more are wanted, the next are due five seconds later."""
+"""Number of passes (1) at a time at most: where more are wanted, the next are due when the test has grown."""
 
 
 @dataclass(frozen=True)
