@@ -28,6 +28,7 @@ from sdimu_calibration.core.evidence.signatures import Epochs, Regressors, const
 from sdimu_calibration.core.filter import filter_pass  # noqa: E402
 from sdimu_calibration.core.filter.filter_pass import COPY, MEASURED, NAV, PassState, new_output  # noqa: E402
 from sdimu_calibration.core.filter.kalman import update  # noqa: E402
+from sdimu_calibration.core.filter.pass_setup import pass_settings  # noqa: E402
 from sdimu_calibration.core.live import LiveCalibration  # noqa: E402
 from sdimu_calibration.core.navigation import strapdown  # noqa: E402
 from sdimu_calibration.core.plan import Plan, Turn  # noqa: E402
@@ -66,7 +67,7 @@ def parts_of_the_pass() -> None:
     p = 1
     s = NAV + p + COPY
     x, P, z, S = np.zeros(s), np.eye(s), np.zeros(MEASURED), np.eye(MEASURED)
-    settings = at_rest()._settings
+    settings = pass_settings(at_rest().setup, closed_loop=False)
     state = PassState(x, P, np.eye(3), np.zeros(3), np.zeros(3), np.zeros(p))
     _, H, R, M = filter_pass._measurement(settings, state, np.zeros((6, p)), np.zeros(6), 1.0, p, 1.0)
     update(x, P, z, H, R, M)

@@ -89,7 +89,15 @@ def until_nothing_moves(
 
 
 def furthest_move(step: Floats, covariance: Floats) -> float:
-    """Largest step (p,) of a coefficient, in its sigma (1); those that are known have a covariance of zero."""
+    """Largest step of a coefficient, in its sigma (1).
+
+    Parameters
+    ----------
+    step : ndarray, shape (p,)
+        SI.
+    covariance : ndarray, shape (p, p)
+        SI; zero where a coefficient is known.
+    """
     sigma = np.sqrt(np.diag(covariance))
     free = sigma > 0.0
     return float(np.max(np.abs(step[free]) / sigma[free], initial=0.0))
