@@ -226,7 +226,7 @@ def print_out_of_sight(console: Console, summary: DiagnosisSummary) -> None:
             f"{taken_for_granted(summary.assumed)}",
         )
     if any(r.testable for r in summary.reached):
-        line(console, f"told in 80 % of tests, {TOLD_AS}, from: {smallest(summary.reached)}")
+        line(console, f"size that is told in 80 % of tests ({TOLD_AS}): {smallest(summary.reached)}")
 
 
 def taken_for_granted(assumed: Sequence[Assumed]) -> str:

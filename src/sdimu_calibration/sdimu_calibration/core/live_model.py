@@ -31,8 +31,8 @@ NO_AZIMUTH = (
 )
 """Note on a filter on the way that does without the azimuth."""
 SQUARES = (
-    "squares of the errors of this IMU count: in the first five stops sigmas of the filter on the way may be too small; it "
-    "looks back on them with what it knows by then, and the end of the test sees everything"
+    "squares of the errors of this IMU count: in the first five stops sigmas on the way may be too small; "
+    "it looks back on them with what it knows by then, and the end of the test sees everything"
 )
 """Note on a filter on the way that knows large errors to first order until its passes have seen some stops."""
 
