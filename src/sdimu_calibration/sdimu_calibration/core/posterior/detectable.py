@@ -96,7 +96,9 @@ def _even(data: Data, family: Ints, noises: Rivals) -> Floats:
     alike = data.J * np.outer(unit, unit)
     place, other = np.nonzero((np.abs(alike) > _ALIKE) & (family[:, None] == family))
     begin = np.searchsorted(place, np.arange(len(own) + 1))
-    near = np.column_stack([other.astype(np.float64), alike[place, other]])
+    rho = alike[place, other]
+    parted = np.sqrt(2.0 * INDISTINGUISHABLE / np.maximum(1.0 - rho**2, 1e-300))
+    near = np.column_stack([other.astype(np.float64), rho, parted])
     table = np.column_stack([own, data.prior.log_more(())])
     return np.asarray(even_scores(table, data.prior.positive, near, begin, noises.offset, noises.taken, _WIDTHS))
 
@@ -126,16 +128,15 @@ def _log_odds(
 ) -> float:
     """Log odds (1) of the family of a candidate over nothing, at its score z.
 
-    own : information on it in units of its prior size, and its log odds; table : those of all; near : places and
-    correlations of those of its family that look alike; noise : log weights of rivals, and the shares that they take.
+    own : information on it in units of its prior size, and its log odds; table : those of all; near : places of those of
+    its family that look alike, their correlations, and the scores from which the data part them; noise : log weights of rivals, and the shares that they take.
     """
     c, pull = own[0], z * np.sqrt(own[0])
     alone = _log_factor(c, pull, widths) + own[1]
     whole = alone
     for k in range(len(near)):
         j, rho = int(near[k, 0]), near[k, 1]
-        apart = 0.5 * z * z * (1.0 - rho * rho) > INDISTINGUISHABLE
-        if apart or abs(rho) >= _ITSELF or (positive[j] and rho < 0.0):
+        if z > near[k, 2] or abs(rho) >= _ITSELF or (positive[j] and rho < 0.0):
             continue
         whole = _log_sum(whole, _log_factor(table[j, 0], z * rho * np.sqrt(table[j, 0]), widths) + table[j, 1])
     there, none = whole, 0.0
@@ -162,9 +163,9 @@ def even_scores(
         Information on each in units of its prior size, and its log odds before the data (1).
     positive : ndarray of bool, shape (q,)
         Whose size cannot be negative.
-    near : ndarray, shape (k, 2)
-        Places of those of its family that look alike, and their correlation with a candidate (1), candidate by
-        candidate.
+    near : ndarray, shape (k, 3)
+        Places of those of its family that look alike, their correlation with a candidate (1), and the score from which
+        the data part the two (sigma), candidate by candidate.
     begin : ndarray of int, shape (q + 1,)
         Where those of each begin.
     offset : ndarray, shape (m,)
