@@ -128,8 +128,9 @@ def _log_odds(
 ) -> float:
     """Log odds (1) of the family of a candidate over nothing, at its score z.
 
-    own : information on it in units of its prior size, and its log odds; table : those of all; near : places of those of
-    its family that look alike, their correlations, and the scores from which the data part them; noise : log weights of rivals, and the shares that they take.
+    own : information on it in units of its prior size, and its log odds; table : those of all; near : places of those
+    of its family that look alike, their correlations, and the scores from which the data part them; noise : log weights
+    of rivals, and the shares that they take.
     """
     c, pull = own[0], z * np.sqrt(own[0])
     alone = _log_factor(c, pull, widths) + own[1]
