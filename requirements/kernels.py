@@ -67,11 +67,11 @@ def parts_of_the_pass() -> None:
     p = 1
     s = NAV + p + COPY
     x, P, z, S = np.zeros(s), np.eye(s), np.zeros(MEASURED), np.eye(MEASURED)
-    settings = pass_settings(at_rest().setup, closed_loop=False)
+    settings = pass_settings(at_rest().setup)
     state = PassState(x, P, np.eye(3), np.zeros(3), np.zeros(3), np.zeros(p))
     _, H, R, M = filter_pass._measurement(settings, state, np.zeros((6, p)), np.zeros(6), 1.0, p, 1.0)
     update(x, P, z, H, R, M)
-    filter_pass._feed_back(settings, state, p)
+    filter_pass._feed_back(settings, state)
     filter_pass._write(new_output(1, p, True, 1), 0, 0, z, S[:, 0], S)
 
 

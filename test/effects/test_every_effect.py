@@ -340,7 +340,7 @@ def test_filter_matrices_are_the_derivative_of_compensation_and_navigation(name,
     """Change each coefficient in the compensation, navigate freely, and compare with Phi, G and H."""
     effect = of(name)
     found, setup = passed(perfect, effect)
-    settings = pass_settings(setup, closed_loop=False)
+    settings = pass_settings(setup)
     settings = settings._replace(decay_rate=np.zeros_like(settings.decay_rate), drive=np.zeros_like(settings.drive))
     kind = np.where(perfect.prepared.phases.used, HELD_ALL, SKIP).astype(np.int64)
     free = replace(found, output=new_output(len(kind), len(setup.sensors.prior), True, 1))

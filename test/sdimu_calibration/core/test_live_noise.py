@@ -36,13 +36,13 @@ def wandering(name, times=1.0):
     )
 
 
-def in_flicker(imu, seed):
+def in_flicker(imu, seed, rest_s=20.0):
     """Give the scenario of an IMU in flicker of its own bias instability: the turns of kim18 in ten minutes."""
     gyro, accel = from_si(imu.gyro_bias_instability, "deg/h"), from_si(imu.accel_bias_instability, "ug")
     noise = (f"gyro_noise_flicker={gyro:.5g} deg/h", f"accel_noise_flicker={accel:.5g} ug")
     plan = load_plan("kim18")
     turns = tuple(replace(turn, rate_rad_s=np.radians(10.0)) for turn in plan.turns)
-    short = replace(plan, turns=turns, dwell_s=(20.0,) * len(plan.dwell_s), acceleration_rad_s2=np.radians(5.0))
+    short = replace(plan, turns=turns, dwell_s=(rest_s,) * len(plan.dwell_s), acceleration_rad_s2=np.radians(5.0))
     return Scenario(short, imu, SITE, rate_hz=20.0, seed=seed, noise=noise)
 
 
@@ -124,6 +124,14 @@ def test_sigmas_on_the_way_hold_where_errors_or_the_first_azimuth_are_far_off(na
     found = [last_on_the_way(in_flicker(load_imu(name), seed), model)[1] for seed in SEEDS]
     # As above. First order about what was not known yet has 1.8, 9.5 and 1.2.
     assert 0.65 < rms(z for one in found for z in one.values()) < 1.35
+
+
+@pytest.mark.parametrize("name", ["mems_industrial", "mems_consumer"])
+def test_the_filter_looks_back_where_every_rest_is_short(name, model):
+    """Of 4 s, fewer seconds than lie between two questions whether to look back."""
+    found = [last_on_the_way(in_flicker(load_imu(name), seed, rest_s=4.0), model)[1] for seed in SEEDS]
+    # Without passes it was 3 and 19 (seeds 1 to 3, white noise).
+    assert rms(z for one in found for z in one.values()) < 1.35
 
 
 def test_an_imu_file_without_noise_of_a_memory_has_no_states_of_it(model, imu):

@@ -1,4 +1,4 @@
-"""The closed-loop filter fed in pieces, as a test goes on; the end of the test is `calibrate` on all of it.
+"""The filter on the way fed in pieces, as a test goes on; the end of the test is `calibrate` on all of it.
 
 Stamps are integers (ns). The end goes through the front door of every recording (`front_door`), so that live and
 offline give the same digits. On the way the filter gets what can be known by then: units and signs as soon as the
@@ -245,7 +245,7 @@ class LiveCalibration:
         self._close_epochs(until_s if final else min(until_s, decided_s), log)
         try:
             return self._filter()
-        except DataError as error:
+        except (DataError, np.linalg.LinAlgError) as error:
             # The same samples may do at the end, when clocks are compared and the whole test is seen.
             self.notes.append(f"the filter on the way stops: {error}; the end of the test is calibrated all the same")
             self._stop()

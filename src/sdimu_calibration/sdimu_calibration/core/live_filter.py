@@ -1,7 +1,8 @@
-"""The closed-loop filter on the way, epoch by epoch; passes over everything so far put its past right.
+"""The filter on the way, epoch by epoch; passes over everything so far put its past right.
 
-Between passes it feeds back what it finds into navigation and compensation. Its samples are corrected exactly at the
-coefficients of the last pass, so that what it leaves out are squares of what it has learned since.
+Between passes it feeds coefficients, position and velocity back; the error of the attitude stays a state. Its samples
+are corrected exactly at the coefficients of the last pass, so that what it leaves out are squares of what it has
+learned since.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from sdimu_calibration.core.effects.error_slope import slope_is_constant
 from sdimu_calibration.core.effects.motion import Motion
 from sdimu_calibration.core.filter.filter_pass import COPY, NAV, PassInput, PassState, new_output, run_pass
 from sdimu_calibration.core.filter.pass_loop import furthest_move
-from sdimu_calibration.core.filter.pass_setup import firm_setup, no_shifts, pass_settings, start_state
+from sdimu_calibration.core.filter.pass_setup import check_finite, firm_setup, no_shifts, pass_settings, start_state
 from sdimu_calibration.core.filter.passes import PIECE
 from sdimu_calibration.core.live_history import Kept, LiveHistory
 from sdimu_calibration.core.live_model import LiveModel
@@ -34,8 +35,8 @@ from sdimu_calibration.core.recording import DataError, TemperatureLog
 from sdimu_calibration.core.rotation import orthonormal, rotation_matrix
 
 _EVERY = 5
-"""Number of measured epochs of a stop (1) from one look whether passes are due to the next: the first seconds of a stop
-tell most, and looking takes time."""
+"""Number of measured epochs (1), of one stop or of several short ones, from one look whether passes are due to the
+next: the first seconds of a stop tell most, and looking takes time."""
 _MOVED = 1.0
 """Movement since the last pass (sigma) from which passes are due: below it the next second of data counts for more."""
 _GROWN = 1.1
@@ -71,7 +72,7 @@ class LiveFilter:
     def __init__(self, model: LiveModel, interval_s: float, alignment: Alignment) -> None:
         setup = model.setup
         self._model, self._interval_s, self._alignment = model, interval_s, alignment
-        self._settings = pass_settings(firm_setup(setup), closed_loop=False, averaged=model.averaged)
+        self._settings = pass_settings(firm_setup(setup), model.averaged)
         self._reference = np.zeros(len(setup.sensors.prior))
         self._weight: Floats | None = None
         self._C_start = alignment.C_nb.copy()
@@ -80,6 +81,7 @@ class LiveFilter:
         self._before: Motion | None = None
         self._acceleration = self._rested_s = 0.0
         self._history = LiveHistory()
+        self._turned, self._unasked = False, 0
         self._loose, self._epochs, self._work, self._looked = True, 0, 0, 0
         self._stood, self._force = 0, np.zeros(3)
         self._C_stop: Floats | None = None
@@ -112,8 +114,12 @@ class LiveFilter:
         self._history.add(kept, temperature)
         self._run(kept, self._measured(part, bool(one.dwell[0]), setup.around(temperature)))
         self._epochs += 1
-        if self._stood and self._stood % _EVERY == 0 and one.stop[0] > 0 and self._due():
-            self._look_back()
+        self._turned = self._turned or not one.dwell[0]
+        self._unasked += bool(self._stood)
+        if self._stood and self._turned and self._unasked >= _EVERY:
+            self._unasked = 0
+            if self._due():
+                self._look_back()
 
     def _due(self) -> bool:
         """Whether the estimate has moved so far that passes are worth their work, and what they take is left."""
@@ -150,6 +156,7 @@ class LiveFilter:
         )
         out = new_output(1, len(self._reference), False, 1)
         run_pass(data, self._settings, self._deviation, out)
+        check_finite(self._deviation)
         used, x = self._deviation.used, self._deviation.x
         used[:] += x[NAV:-COPY]
         x[NAV:-COPY] = 0.0
@@ -228,7 +235,7 @@ class LiveFilter:
         begin = StartPoint(rotation_matrix(before.x[-COPY:].copy()) @ self._C_start, before.used)
         try:
             found = passes_so_far(model, prepared, self._alignment, begin, self._loose)
-        except DataError:
+        except (DataError, np.linalg.LinAlgError):
             # What diverges now may be right with more stops; until then the filter goes on as it is.
             self._work += self._epochs
             return

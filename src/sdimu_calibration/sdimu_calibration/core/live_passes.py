@@ -64,7 +64,7 @@ def passes_so_far(
         setup = wide if loose else firm
         at = linearise(prepared, setup, C_nb, reference)
         state = begun(at, setup, alignment)
-        settings = pass_settings(setup, False, model.averaged)
+        settings = pass_settings(setup, model.averaged)
         run_pass(at.data, settings, state, new_output(len(at.data.first), len(reference), False, len(at.data.first)))
         check_finite(state)
         found = SoFar(reference, at.C_start, state, loose, count)

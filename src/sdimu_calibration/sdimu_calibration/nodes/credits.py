@@ -7,7 +7,7 @@ samples and then refuses. So consumers grant credits, and a simulated producer s
 ``<topic>``            the data, whatever their type
 ``<topic>/credit``     std_msgs/Header, consumer to producer: stamp reached, frame_id = the consumer's full
                        node name. Stamp 0 says "ready, nothing received": the producer counts it as being level.
-                       Sent every hundred samples, and repeated every 0.25 s while the consumer is idle.
+                       Sent every hundred samples, and repeated every 0.25 s unless samples wait in it.
 ``<topic>/end``        std_msgs/Header, latched, producer to consumers: stamp of the last message.
                        A consumer answers with a credit of that stamp once it holds everything.
 =====================  ==========================================================================

@@ -395,7 +395,7 @@ def separation(calibration: Calibration, draw: Draw) -> str:
     return f"<p>{escape(words)}</p>{draw(evidence_figures.correlation(names, C))}"
 
 
-_SMALLEST = ("effect", "size told in 80 %", "unit", "usual size", "share of signature left", "testable here")
+_SMALLEST = ("effect", "size told in 80 % of tests", "unit", "usual size", "share of signature left", "testable here")
 
 
 def smallest(
@@ -417,7 +417,7 @@ def smallest(
         "What could have been seen",
         f"<p>Of {len(rows)} effects, {unseen} have an axis on which they could not have been seen at their usual size, "
         f"{never} of these one on which they {UNSEEN}.</p>",
-        f"<details><summary>Table of minimal detectable sizes</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
+        f"<details><summary>Table of the sizes that are told</summary>{grid(_SMALLEST, rows, {0, 2, 5})}</details>",
         _taken_for_granted(assumed),
         quiet(
             f"Worst axis of each effect. Of tests with an effect of this size and nothing else missing, 80 % tell it: "

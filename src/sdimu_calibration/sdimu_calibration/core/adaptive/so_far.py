@@ -123,7 +123,7 @@ def so_far(fit: NavigationFit, more: Sequence[Effect] = (), room: float = 1.0, h
     )
     data = pass_input(prepared, sensors.regressors(seen), sensors.channel, sensors.parameter)
     output = new_output(len(prepared.epochs), len(prior), False, len(prepared.epochs))
-    run_pass(data, pass_settings(setup, closed_loop=False), begin, output)
+    run_pass(data, pass_settings(setup), begin, output)
     check_finite(begin)
     return SoFar(setup, _at_rest(setup, begin, C_nb), seen, prepared.temperature, fit.start.C_nb, len(fit.names))
 
@@ -155,7 +155,7 @@ def ahead(at: SoFar, turn: Turn | None, dwell_s: float, acceleration_rad_s2: flo
     data = data._replace(first=data.first - skipped, last=data.last - skipped)
     state = PassState(*(v.copy() for v in at.state))
     output = new_output(int(new.sum()), len(sensors.prior), False, 1)
-    run_pass(data, pass_settings(setup, closed_loop=False), state, output)
+    run_pass(data, pass_settings(setup), state, output)
     check_finite(state)
     moved = sum(t.duration_s for t in turns)
     rows = np.flatnonzero(data.kind != SKIP)

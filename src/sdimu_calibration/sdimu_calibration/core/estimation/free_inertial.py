@@ -314,7 +314,7 @@ def _promised(
     P = np.zeros((s, s))
     P[NAV : NAV + q, NAV : NAV + q] = seen.covariance
     P[range(6, 9), range(6, 9)] = np.square([_WIDE_LEVEL, _WIDE_LEVEL, sigma_azimuth])
-    settings = pass_settings(setup, closed_loop=False)._replace(extra_gyro=_BLIND)
+    settings = pass_settings(setup)._replace(extra_gyro=_BLIND)
     place = np.array([setup.site.latitude_rad, 0.0, setup.site.height_m])
     known = np.zeros(q)
     state = PassState(np.zeros(s), P, C_start.copy(), np.zeros(3), place.copy(), known.copy())

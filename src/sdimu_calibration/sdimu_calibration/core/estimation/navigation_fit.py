@@ -318,7 +318,7 @@ class NavigationFit(Fit):
         last = self.last
         state = PassState(*(v.copy() for v in last.start))
         output = new_output(len(kind), len(self.estimate), False, len(kind))
-        run_pass(last.data._replace(kind=kind), pass_settings(firm_setup(self.setup), closed_loop=False), state, output)
+        run_pass(last.data._replace(kind=kind), pass_settings(firm_setup(self.setup)), state, output)
         return output.normalised
 
     def evidence(self, effects: Sequence[Effect] = ()) -> NavigationEvidence:

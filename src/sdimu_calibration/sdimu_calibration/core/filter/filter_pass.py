@@ -47,7 +47,7 @@ from sdimu_calibration.core.navigation.ins_errors import (
     transition,
 )
 from sdimu_calibration.core.navigation.strapdown import mean_attitude, navigate_cycle, velocity_increment
-from sdimu_calibration.core.rotation import orthonormal, rotation_matrix, rotation_vector, skew
+from sdimu_calibration.core.rotation import orthonormal, rotation_vector, skew
 
 NAV = 9
 """Number of navigation error states: position, velocity, attitude."""
@@ -112,8 +112,6 @@ class PassSettings(NamedTuple):
     drive: Floats
     """`decay_rate`, `drive`: decay (1/s) and added variance per second, which fades too, of each coefficient,
     shape (p,)."""
-    closed_loop: bool
-    """Feed attitude and coefficients back too, not only position and velocity."""
     shared_noise: bool
     """Model the cross-covariance M."""
     shaken: bool = False
@@ -306,13 +304,9 @@ def _measurement(
 
 
 @compiled
-def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
-    """Move the mean of the fed-back states into navigation and compensation, in place.
-
-    The attitude reset turns the error frame: with the correction e, the new error is (old - e) + e x old / 2,
-    so the covariance turns by I + [e x] / 2 (the first order of Baker-Campbell-Hausdorff).
-    """
-    x, P = state.x, state.P
+def _feed_back(settings: PassSettings, state: PassState) -> None:
+    """Move the mean of the errors of position and velocity into the navigation, in place."""
+    x = state.x
     r_n, r_e = earth.radii(settings.reference[0])
     cos = np.cos(min(abs(settings.reference[0]), earth.POLE_LIMIT))
     state.position[0] -= x[0] / (r_n + settings.reference[2])
@@ -321,24 +315,13 @@ def _feed_back(settings: PassSettings, state: PassState, p: int) -> None:
     for i in range(3):
         state.velocity[i] -= x[3 + i]
         x[i] = x[3 + i] = 0.0
-    if not settings.closed_loop:
-        return
-    e = x[6:9].copy()
-    put(orthonormal(sparse_product(rotation_matrix(e), state.C_nb)), state.C_nb, 0, 0)
-    if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 > 1e-14:
-        J = np.eye(3) + 0.5 * skew(e)
-        put(sparse_product(J, P[6:9, :]), P, 6, 0)
-        put(sparse_product(P[:, 6:9], J.T), P, 0, 6)
-    for j in range(p):
-        state.used[j] += x[NAV + j]
-    x[6 : NAV + p] = 0.0
 
 
 @compiled
 def _go_on_from(C_nb: Floats, state: PassState) -> None:
     """Go on from the attitude `C_nb` (3, 3), in place: the attitude error is counted from there.
 
-    No half product of shift and error is added as after a reset of a closed loop: the rows of Zf know no second order,
+    No half product of shift and error is added as after a reset of the attitude: the rows of Zf know no second order,
     so an error in them is the tilt as it is seen, whatever the azimuth, and tilts so seen add. With the half product
     every shift says something about azimuth that no sample said.
     """
@@ -447,7 +430,7 @@ def run_pass(data: PassInput, settings: PassSettings, state: PassState, out: Pas
                 put(Hl[:, :kept], out.H[e], low, 0)
                 put(L, out.L[e], low, low)
             if kind > 0:
-                _feed_back(settings, state, p)
+                _feed_back(settings, state)
         if data.share[e] > 0.0:
             into_means(data.share[e], settings.averaged, NAV, state.x, state.P, state.used)
         for j in range(p):

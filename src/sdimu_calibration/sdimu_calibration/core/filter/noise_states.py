@@ -1,4 +1,4 @@
-"""Noise with a memory as states of the closed-loop filter, so that its sigmas hold while a test runs.
+"""Noise with a memory as states of the filter on the way, so that its sigmas hold while a test runs.
 
 A bias that wanders is no constant: a filter that takes it for one averages it as if it were white, and its sigmas fall
 below the wander. Random walk is one state a sensor. Flicker is a sum of Gauss-Markov states, a decade of time constant

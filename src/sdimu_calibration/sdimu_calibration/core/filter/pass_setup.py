@@ -33,7 +33,7 @@ NO_MEANS: Ints = np.empty((0, 2), dtype=np.int64)
 """Places of states that are means of others, shape (0, 2), dimensionless: none has noise with a memory."""
 
 
-def pass_settings(setup: TestSetup, closed_loop: bool, averaged: Ints = NO_MEANS) -> PassSettings:
+def pass_settings(setup: TestSetup, averaged: Ints = NO_MEANS) -> PassSettings:
     """Make the constants of a pass.
 
     Parameters
@@ -53,7 +53,6 @@ def pass_settings(setup: TestSetup, closed_loop: bool, averaged: Ints = NO_MEANS
         position_sigma=model.position_sigma,
         decay_rate=setup.sensors.decay_rate,
         drive=setup.sensors.drive,
-        closed_loop=closed_loop,
         shared_noise=model.shared_noise,
         shaken=setup.shaken,
         averaged=averaged,

@@ -125,7 +125,7 @@ def run_linearised(at: Linearisation, setup: TestSetup, begin: PassState, keep: 
     """
     state = PassState(*(v.copy() for v in begin))
     output = new_output(len(at.data.first), len(begin.used), keep, SNAPSHOT_EPOCHS, navigation_only=keep)
-    run_pass(at.data, pass_settings(setup, closed_loop=False), state, output)
+    run_pass(at.data, pass_settings(setup), state, output)
     try:
         check_finite(state)
     except DivergedError as error:
