@@ -32,7 +32,7 @@ NO_AZIMUTH = (
 """Note on a filter on the way that does without the azimuth."""
 SQUARES = (
     "squares of the errors of this IMU count: in the first five stops sigmas on the way may be too small; "
-    "it looks back on them with what it knows by then, and the end of the test sees everything"
+    "the filter looks back on them with what it knows by then, and the end of the test sees everything"
 )
 """Note on a filter on the way that knows large errors to first order until its passes have seen some stops."""
 

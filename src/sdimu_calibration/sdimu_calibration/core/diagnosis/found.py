@@ -220,10 +220,6 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
     p = len(evidence.weight)
     full = evidence.information
     scanned = scan(full, evidence.model, evidence.weight)
-    J = scanned.J
-    left = np.greater(J, _ROUNDING * np.diag(full.J))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.where(left, 1.0 / np.sqrt(np.abs(J)), np.inf)
     size = _told_from(d)
     out = []
     for k, candidate in enumerate(evidence.candidates, start=p):
@@ -240,7 +236,7 @@ def reach(d: Diagnosis) -> tuple[DetectableSize, ...]:
                 float(scanned.retention[k]),
                 testable,
                 partners,
-                float(sigma[k]),
+                float(scanned.sigma[k]),
                 float(evidence.prior[k - p]),
             )
         )
@@ -253,11 +249,6 @@ def _told_from(d: Diagnosis) -> dict[str, float]:
     board: Board[Any] = Board(d.evidence, looked_at(d), frozenset(), None) if window is None else window.board
     scores = told_from(board, () if window is None else d.found.noise)
     return {board.evidence.candidate(column).label: size for column, size in scores.size.items()}
-
-
-_ROUNDING = 1e-9
-"""Share of the information on a parameter that the model must leave: less is a difference of nearly equal numbers, and
-rounding."""
 
 
 def _partners(names: tuple[str, ...], J: Floats, weight: Floats, column: int) -> tuple[str, ...]:
